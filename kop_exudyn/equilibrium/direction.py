@@ -1,0 +1,70 @@
+"""Newton directions of a scene with or without the mean-angle equation, convexified where they have to be."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .system import System
+
+_SHIFT_START = 1e-6  # of the median rotational stiffness; a soft mode of a large structure is about that soft
+_SHIFT_GROWTH = 8.0
+_MAX_SHIFTS = 40
+
+
+@dataclass(frozen=True)
+class Border:
+    """The constraint seen through the factorised matrix: K^-1 c and c.K^-1 c."""
+
+    column: np.ndarray
+    schur: float
+
+
+def factorise_convex(system: System, shift: float = 0.0) -> tuple[float, Border | None]:
+    """Factorise K + shift M with the smallest tried shift that makes it positive definite on the constraint's kernel.
+
+    Returns the shift that was used and the border (None without actuation).
+    """
+    base = None
+    for _ in range(_MAX_SHIFTS):
+        negative = system.factorise(shift)
+        border = border_of(system) if negative <= 1 and system.constraint is not None else None
+        if is_convex(negative, border):
+            return shift, border
+        if base is None:
+            rotational = np.abs(system.values[system.sparsity.diagonal][system.is_rotation])
+            base = _SHIFT_START * float(np.median(rotational))
+        shift = max(_SHIFT_GROWTH * shift, base)
+    raise FloatingPointError("no shift makes the stiffness positive definite")
+
+
+def border_of(system: System) -> Border | None:
+    """K^-1 c with the factorisation at hand, or None without actuation."""
+    if system.constraint is None:
+        return None
+    column = system.solve(system.constraint)
+    return Border(column, float(system.constraint @ column))
+
+
+def is_convex(negative: int, border: Border | None) -> bool:
+    """Whether K is positive definite on the constraint's kernel, given its non-positive pivots.
+
+    The bordered matrix [[K, c], [c^T, 0]] has the inertia of K plus the sign of -c.K^-1 c; K is positive definite on
+    the kernel of c exactly when the bordered matrix has one negative eigenvalue (Haynsworth; Gould 1985).
+    """
+    if border is None:
+        return negative == 0
+    return (negative == 0 and border.schur > 0) or (negative == 1 and border.schur < 0)
+
+
+def bordered_solve(
+    system: System, border: Border | None, rhs: np.ndarray, gap: float | np.ndarray = 0.0
+) -> tuple[np.ndarray, np.ndarray | float]:
+    """Solve K d + c t = rhs, c.d = gap; rhs (n,) or (n, k), gap scalar or (k,). Returns d and t (0 without border)."""
+    d = system.solve(rhs)
+    if border is None:
+        return d, 0.0
+    multiplier = (system.constraint @ d - gap) / border.schur
+    if d.ndim == 1:
+        return d - border.column * multiplier, multiplier
+    return d - border.column[:, None] * multiplier, multiplier

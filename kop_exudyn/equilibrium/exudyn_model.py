@@ -1,0 +1,313 @@
+"""The Exudyn model of a scene and its static solve: every equilibrium that is kept is Exudyn's own solution.
+
+The only module that sees Exudyn's item numbers. Beams are `ObjectBeamGeometricallyExact` between
+`NodeRigidBodyRotVecLG`; corners and rigid attachments are `ObjectJointGeneric`, free hinges `ObjectJointRevoluteZ`;
+the actuation torque is applied as equal and opposite body-fixed torques; loads, attraction and actuators as the forces
+that they exert at the equilibrium. The model is built once a topology; lengths, angles and loads are set in place.
+"""
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from ..errors import SimulationFailure
+from ..rods.rotations import exp_so3, log_so3, rotation_z
+from ..scene.scene import Scene
+from ..scene.state import State
+from .exudyn_layout import Carrier, layout_of
+from .newton import Equilibrium
+
+_TESTED = (1, 13, 6)
+
+try:
+    import exudyn as exu
+    import exudyn.itemInterface as item
+except ImportError as error:
+    raise ImportError("kop_exudyn needs exudyn >= 1.13.6 (pip install 'exudyn>=1.13.6')") from error
+
+if tuple(int(part) for part in exu.GetVersionString().split(".")[:3]) < _TESTED:
+    raise ImportError(
+        f"kop_exudyn needs exudyn >= 1.13.6, found {exu.GetVersionString()}: older releases take the rod's stress-free "
+        "state from other data than the reference coordinates, and would give wrong equilibria")
+
+# Round-off of Exudyn's residual relative to EA: below it, a re-solve of a solution could not converge.
+_ABSOLUTE_TOLERANCE = 1e-13
+# Relative to the first residual, which is that of all reactions missing (Exudyn's static Newton starts its multipliers
+# at zero). Its joints leave their geometric stiffness out of the Jacobian, so that close to a bifurcation the residual
+# stalls near 1e-7 of the forces; elsewhere the first step reaches 1e-10.
+_RELATIVE_TOLERANCE = 1e-6
+_MAX_STEPS = 4
+# A solution further away than this, relative to the size, is another equilibrium and confirms nothing.
+_MAX_MOVE = 1e-6
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """What Exudyn's static solver made of an equilibrium.
+
+    version : Exudyn's version
+    newton_steps : steps that it took from the given state
+    residual : its final residual relative to the largest internal force
+    moved : largest displacement of a body, relative to the scene's size
+    wall_s : seconds, model update and solve
+    state : Exudyn's solution
+    """
+
+    version: str
+    newton_steps: int
+    residual: float
+    moved: float
+    wall_s: float
+    state: State
+
+    def to_dict(self) -> dict[str, float | int | str]:
+        """The figures, as written in result files."""
+        return {"version": self.version, "newton_steps": self.newton_steps, "residual": self.residual,
+                "moved": self.moved, "wall_s": self.wall_s}
+
+
+class ExudynModel:
+    """Exudyn's model of one scene; `confirm` may be called for any equilibrium of that scene."""
+
+    def __init__(self, scene: Scene):
+        self.scene = scene
+        self.layout = layout_of(scene)
+        self._container = exu.SystemContainer()
+        self._mbs = self._container.AddSystem()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)
+            self._add_nodes_and_beams()
+            self._add_joints()
+            self._add_pins()
+            self._add_loads()
+            self._mbs.Assemble()
+        self._settings = self._solver_settings()
+
+    def confirm(self, equilibrium: Equilibrium) -> Confirmation:
+        """Solve with Exudyn, starting from the equilibrium.
+
+        Raises SimulationFailure when Exudyn's static solver doesn't converge from there, or to another state.
+        """
+        begin = perf_counter()
+        scene = self.scene
+        lengths = scene.rest_lengths(equilibrium.q)
+        reference = self.layout.reference_coordinates(scene, lengths)
+        self._set_parameters(equilibrium, lengths, reference)
+        total = self._coordinates(equilibrium.state)
+        self._mbs.systemData.SetODE2Coordinates((total - reference).ravel(),
+                                                configuration=exu.ConfigurationType.Initial)
+        self._mbs.systemData.SetAECoordinates(np.zeros(self._mbs.systemData.AEsize()),
+                                              configuration=exu.ConfigurationType.Initial)
+        solver = exu.MainSolverStatic()
+        try:
+            success = solver.SolveSystem(self._mbs, self._settings)
+        except Exception as error:  # Exudyn raises its own types, some of them plain RuntimeErrors
+            raise SimulationFailure(f"Exudyn's static solver failed: {str(error).splitlines()[0][:120]}") from None
+        if not success:
+            raise SimulationFailure(f"Exudyn's static solver did not confirm the state within {_MAX_STEPS} Newton "
+                                    f"steps (residual {solver.conv.residual:.2e})")
+        solution = self._mbs.systemData.GetODE2Coordinates().reshape(-1, 6) + reference
+        state = self._state(solution, equilibrium.state)
+        moved = np.abs(state.positions - equilibrium.state.positions).max() / scene.size
+        if not moved < _MAX_MOVE:
+            raise SimulationFailure(f"Exudyn's static solver moved the state by {moved:.2e} of the size")
+        force = np.abs(equilibrium.stress) / np.array([1, 1, 1] + 3 * [scene.length_scale])
+        return Confirmation(
+            exu.GetVersionString(), int(solver.it.newtonSteps), float(solver.conv.residual / max(force.max(), self._tiny)),
+            float(moved), perf_counter() - begin, state)
+
+    # -- model -----------------------------------------------------------------------------------------------------
+    def _add_nodes_and_beams(self) -> None:
+        mbs, scene, layout = self._mbs, self.scene, self.layout
+        lengths = scene.length_constant + np.where(scene.length_parameter >= 0, scene.length_scale, 0.0)
+        self._nodes = [mbs.AddNode(item.NodeRigidBodyRotVecLG(referenceCoordinates=row.tolist()))
+                       for row in layout.reference_coordinates(scene, lengths)]
+        sections: dict[bytes, exu.BeamSection] = {}
+        self._beams = []
+        for (tail, head), K, L in zip(layout.element_nodes, scene.stiffness, lengths):
+            key = K.tobytes()
+            if key not in sections:
+                section = exu.BeamSection()
+                section.stiffnessMatrix = np.diag(K)
+                section.inertia, section.massPerLength = np.eye(3), 1.0  # unused: statics
+                sections[key] = section
+            self._beams.append(mbs.AddObject(item.ObjectBeamGeometricallyExact(
+                nodeNumbers=[self._nodes[tail], self._nodes[head]], length=L, sectionData=sections[key])))
+
+    def _add_joints(self) -> None:
+        mbs, scene, layout = self._mbs, self.scene, self.layout
+        self._ground = mbs.AddObject(item.ObjectGround())
+        self._markers: dict[int, object] = {}
+        self._bodies = {c.node: mbs.AddObject(item.ObjectRigidBody(mass=1, inertia=[1, 1, 1, 0, 0, 0],
+                                                                   nodeNumber=self._nodes[c.node]))
+                        for c in layout.carriers.values() if c.rigid}
+        for key, node, frame, offset in layout.ties:
+            carrier = layout.carriers[key]
+            marker = self._marker(carrier.node) if not offset.any() else mbs.AddMarker(
+                item.MarkerBodyRigid(bodyNumber=self._bodies[carrier.node], localPosition=offset.tolist()))
+            mbs.AddObject(item.ObjectJointGeneric(
+                markerNumbers=[marker, self._marker(node)], constrainedAxes=[1] * 6,
+                rotationMarker0=carrier.frame.T, rotationMarker1=frame.T))
+        driven = set((scene.driven.dofs - 6 * scene.n_bodies).tolist())
+        fixed = scene.pinned[6 * scene.n_bodies:]
+        self._turned: list[tuple[int, int, Carrier]] = []
+        for (body, hinge), carrier in layout.carriers.items():
+            if hinge < 0:
+                continue
+            hub = layout.carriers[body, -1]
+            markers = [self._marker(hub.node), self._marker(carrier.node)]
+            if hinge in driven or fixed[hinge]:
+                joint = mbs.AddObject(item.ObjectJointGeneric(
+                    markerNumbers=markers, constrainedAxes=[1] * 6, rotationMarker0=hub.frame.T,
+                    rotationMarker1=carrier.frame.T))
+                self._turned.append((joint, hinge, hub))
+            else:
+                mbs.AddObject(item.ObjectJointRevoluteZ(
+                    markerNumbers=markers, rotationMarker0=hub.frame.T, rotationMarker1=carrier.frame.T))
+
+    def _add_pins(self) -> None:
+        """Ground joints for pinned and driven coordinates; one body is held where the scene holds none.
+
+        A scene that only an attraction holds is in balance under the attraction's forces, which act here as given
+        forces: holding one body then takes no force.
+        """
+        scene = self.scene
+        held = scene.pinned[: 6 * scene.n_bodies].reshape(-1, 6).copy()
+        for dof in scene.driven.dofs[scene.driven.dofs < 6 * scene.n_bodies]:
+            held[dof // 6, dof % 6] = True
+        if not held.any():
+            held[0] = True
+        self._pins = []
+        for body in np.flatnonzero(held.any(1)):
+            ground = self._mbs.AddMarker(item.MarkerBodyRigid(bodyNumber=self._ground, localPosition=[0, 0, 0]))
+            carrier = self.layout.carriers[int(body), -1]
+            turning = held[body, 3:].any()
+            joint = self._mbs.AddObject(item.ObjectJointGeneric(
+                markerNumbers=[ground, self._marker(carrier.node)], constrainedAxes=held[body].astype(int).tolist(),
+                rotationMarker1=carrier.frame.T))
+            self._pins.append((ground, joint, int(body), bool(turning and held[body, 3:].all())))
+
+    def _add_loads(self) -> None:
+        """Load items whose values `_set_parameters` fills in; only where something can act."""
+        mbs, scene, layout = self._mbs, self.scene, self.layout
+        self._torques, self._weights, self._wrenches = [], [], []
+        if scene.actuated is not None:
+            for hinge in scene.actuated:
+                carrier = next(c for key, c in layout.carriers.items() if key[1] == hinge)
+                hub = layout.carriers[carrier.body, -1]
+                for owner, sign in ((hub, 1.0), (carrier, -1.0)):
+                    load = self._load(item.LoadTorqueVector, owner.node, bodyFixed=True)
+                    self._torques.append((load, sign * owner.frame.T[:, 2]))
+        if scene.weight is not None:
+            ends = np.unique(layout.element_nodes)
+            self._weights = [(int(n), self._load(item.LoadForceVector, n)) for n in ends]
+        for body in sorted({int(d) // 6 for term in scene.terms for d in np.unique(term.dofs) if d < 6 * scene.n_bodies}):
+            hub = layout.carriers[body, -1]
+            self._wrenches.append((body, hub, self._load(item.LoadForceVector, hub.node),
+                                   self._load(item.LoadTorqueVector, hub.node, bodyFixed=True)))
+        self._hinge_wrenches = []
+        for hinge in sorted({int(d) - 6 * scene.n_bodies for term in scene.terms for d in np.unique(term.dofs)
+                             if 6 * scene.n_bodies <= d < scene.n_dofs}):
+            carrier = next(c for key, c in layout.carriers.items() if key[1] == hinge)
+            hub = layout.carriers[carrier.body, -1]
+            for owner, sign in ((hub, -1.0), (carrier, 1.0)):
+                load = self._load(item.LoadTorqueVector, owner.node, bodyFixed=True)
+                self._hinge_wrenches.append((hinge, load, sign * owner.frame.T[:, 2]))
+
+    def _load(self, kind: type, node: int, **options: object) -> object:
+        return self._mbs.AddLoad(kind(markerNumber=self._marker(node), loadVector=[0, 0, 0], **options))
+
+    def _marker(self, node: int) -> object:
+        if node not in self._markers:
+            self._markers[node] = self._mbs.AddMarker(item.MarkerNodeRigid(nodeNumber=self._nodes[node]))
+        return self._markers[node]
+
+    def _solver_settings(self) -> exu.SimulationSettings:
+        settings = exu.SimulationSettings()
+        static = settings.staticSolver
+        static.verboseMode = 0
+        static.numberOfLoadSteps = 1
+        static.adaptiveStep = False
+        static.newton.maxIterations = _MAX_STEPS
+        static.newton.relativeTolerance = _RELATIVE_TOLERANCE
+        stiffness = self.scene.stiffness[:, 0].max()
+        static.newton.absoluteTolerance = _ABSOLUTE_TOLERANCE * stiffness
+        self._tiny = float(np.finfo(float).eps * stiffness)
+        settings.solution.file.write = False
+        settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
+        settings.linearSolver.reuseAnalyzedPattern = True
+        return settings
+
+    # -- values ----------------------------------------------------------------------------------------------------
+    def _set_parameters(self, eq: Equilibrium, lengths: np.ndarray, reference: np.ndarray) -> None:
+        mbs, scene, layout = self._mbs, self.scene, self.layout
+        for node, row in zip(self._nodes, reference):
+            mbs.SetNodeParameter(node, "referenceCoordinates", row.tolist())
+        for beam, length in zip(self._beams, lengths):
+            mbs.SetObjectParameter(beam, "length", float(length))
+        for joint, hinge, hub in self._turned:
+            turn = rotation_z(eq.state.angles[hinge])
+            mbs.SetObjectParameter(joint, "rotationMarker0", hub.frame.T @ turn)
+        for ground, joint, body, turned in self._pins:
+            mbs.SetMarkerParameter(ground, "localPosition", eq.state.positions[body].tolist())
+            if turned:
+                mbs.SetObjectParameter(joint, "rotationMarker0", eq.state.rotations[body])
+        if scene.actuated is not None:
+            per_hinge = eq.torque / len(scene.actuated)
+            for load, axis in self._torques:
+                mbs.SetLoadParameter(load, "loadVector", (per_hinge * axis).tolist())
+        if self._weights:
+            share = 0.5 * lengths[:, None] * scene.weight
+            force = np.zeros((layout.n_nodes, 3))
+            np.add.at(force, layout.element_nodes[:, 0], share)
+            np.add.at(force, layout.element_nodes[:, 1], share)
+            for node, load in self._weights:
+                mbs.SetLoadParameter(load, "loadVector", force[node].tolist())
+        if scene.terms:
+            self._set_wrenches(eq.state)
+
+    def _set_wrenches(self, state: State) -> None:
+        """Forces that the terms exert at the state: minus their gradients."""
+        scene = self.scene
+        total = np.zeros(scene.n_dofs + 1)
+        for term in scene.terms:
+            _, g, _ = term.gradient_hessian(state)
+            np.subtract.at(total, term.dofs, g)
+        for body, hub, force, torque in self._wrenches:
+            part = total[6 * body: 6 * body + 6]
+            self._mbs.SetLoadParameter(force, "loadVector", part[:3].tolist())
+            self._mbs.SetLoadParameter(torque, "loadVector", (hub.frame.T @ part[3:]).tolist())
+        for hinge, load, axis in self._hinge_wrenches:
+            self._mbs.SetLoadParameter(load, "loadVector", (total[6 * scene.n_bodies + hinge] * axis).tolist())
+
+    def _coordinates(self, state: State) -> np.ndarray:
+        """Total coordinates (n_nodes, 6) of Exudyn's nodes at a state."""
+        layout = self.layout
+        x, R = self.scene.node_poses(state)
+        beams = layout.scene_node >= 0
+        out = np.zeros((layout.n_nodes, 6))
+        out[beams, :3], out[beams, 3:] = x[layout.scene_node[beams]], log_so3(R[layout.scene_node[beams]])
+        for carrier in layout.carriers.values():
+            if carrier.rigid:
+                turn = rotation_z(state.angles[carrier.hinge]) if carrier.hinge >= 0 else np.eye(3)
+                out[carrier.node, :3] = state.positions[carrier.body]
+                out[carrier.node, 3:] = log_so3(state.rotations[carrier.body] @ turn)
+        return out
+
+    def _state(self, solution: np.ndarray, near: State) -> State:
+        """The scene's state of Exudyn's coordinates; hinge angles on the same turn as those of a state nearby."""
+        R = exp_so3(solution[:, 3:])
+        positions, rotations, angles = near.positions.copy(), near.rotations.copy(), near.angles.copy()
+        for (body, hinge), carrier in self.layout.carriers.items():
+            if hinge < 0:
+                positions[body] = solution[carrier.node, :3]
+                rotations[body] = R[carrier.node] @ carrier.frame.T
+        for (body, hinge), carrier in self.layout.carriers.items():
+            if hinge >= 0:
+                turn = rotations[body].T @ R[carrier.node] @ carrier.frame.T
+                measured = np.arctan2(turn[1, 0], turn[0, 0])
+                angles[hinge] += np.remainder(measured - near.angles[hinge] + np.pi, 2 * np.pi) - np.pi
+        return State(positions, rotations, angles)

@@ -1,0 +1,304 @@
+"""Static equilibria by Newton's method with independently predicted stresses.
+
+Plain Newton on slender rods crawls along the valley of the stretch-stiff energy. Here the geometric stiffness is taken
+at the stress that the last step predicted, sigma <- (K/L)(e + B d), while the gradient stays exact: the mixed-stress
+iteration of slender-shell continuation (Magisano, Leonetti, Garcea, CMAME 2017). Safeguards: a cap on rotations a
+step, a shift wherever a pivot is not positive, a fall-back to energy descent with line search when the residual
+stops falling. A converged state that the pivots show to be unstable is left along its softest mode: a saddle is never
+returned.
+"""
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from ..errors import SimulationFailure
+from ..scene.assembly import ENERGY
+from ..scene.state import State
+from .direction import Border, border_of, bordered_solve, factorise_convex, is_convex
+from .system import Energy, System
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class NewtonOptions:
+    """Settings of the equilibrium solver.
+
+    tolerance : largest residual force, relative to the largest internal force (round-off is allowed for)
+    max_iterations : over all phases of one solve
+    rotation_cap : rad, largest rotation or hinge turn of one step
+    mixed : predicted-stress iteration; False gives plain Newton with line search
+    patience : mixed iterations without halving the residual before energy descent takes over
+    escapes : how many saddles are left before the solve is given up
+    escape_rotation : rad, largest rotation of the first move away from a saddle
+    side : (n_free,) vector; where the two ways off a saddle are equivalent, the one with positive product is taken
+    """
+
+    tolerance: float = 1e-9
+    max_iterations: int = 300
+    rotation_cap: float = 0.4
+    mixed: bool = True
+    patience: int = 12
+    escapes: int = 6
+    escape_rotation: float = 0.05
+    side: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where a solve starts.
+
+    state : poses and angles
+    torque : the actuation's multiplier
+    stress : (E, 6) generalised stresses for the first geometric stiffness, default none: after a jump in lengths the
+        start's own stresses are spurious compressions that would make the stiffness indefinite
+    """
+
+    state: State
+    torque: float = 0.0
+    stress: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A stable equilibrium of a scene.
+
+    state : poses and angles
+    q : (n_parameters,) parameters that it belongs to
+    opening : prescribed mean actuated angle, or None
+    torque : the actuation's multiplier, energy / rad (0 without actuation): the torque on every actuated hinge is
+        torque / number of actuated hinges
+    stress : (E, 6) generalised stresses (N, Q_y, Q_z, M_t, M_y, M_z) in the elements
+    elastic_energy, potential : energies
+    iterations : Newton iterations of the solve, all phases
+    residual : largest residual force, relative to the largest internal force
+    escapes : saddles left on the way
+    wall_s : seconds
+    """
+
+    state: State
+    q: np.ndarray
+    opening: float | None
+    torque: float
+    stress: np.ndarray
+    elastic_energy: float
+    potential: float
+    iterations: int
+    residual: float
+    escapes: int
+    wall_s: float
+    stable: bool = True
+
+    @property
+    def start(self) -> Start:
+        """This equilibrium as the start of another solve."""
+        return Start(self.state, self.torque, self.stress)
+
+
+def solve(
+    system: System, q: np.ndarray, start: Start | Equilibrium | State | None = None, opening: float | None = None,
+    options: NewtonOptions = NewtonOptions(),
+) -> Equilibrium:
+    """Find the stable equilibrium that the iteration reaches from a start.
+
+    Parameters
+    ----------
+    system : the scene's workspace; afterwards it holds the assembled and factorised Hessian of the solution
+    q : (n_parameters,) parameters
+    start : what to start from (default: the scene's initial state, unstressed); driven unknowns are set from q
+    opening : rad, mean angle of the actuated hinges (must be given exactly when the scene is actuated)
+
+    Raises
+    ------
+    SimulationFailure
+        no stable equilibrium was found; its reason says which limit was met
+    """
+    if (opening is None) != (system.constraint is None):
+        raise ValueError("an opening angle belongs to an actuated scene, and only to one")
+    system.set_parameters(q)
+    if isinstance(start, Equilibrium):
+        start = start.start
+    elif not isinstance(start, Start):
+        start = Start(start if start is not None else system.scene.initial)
+    return _Run(system, q, start, opening, options).solve()
+
+
+class _Run:
+    """One solve: the iterate and the safeguards' memory."""
+
+    def __init__(self, system: System, q: np.ndarray, start: Start, opening: float | None, options: NewtonOptions):
+        self.system, self.q, self.opening, self.options = system, q, opening, options
+        self.state = system.scene.with_driven(start.state, q)
+        self.torque = start.torque
+        system.predicted_stress[:] = 0.0 if start.stress is None else start.stress
+        self.iterations = 0
+        self.escapes = 0
+        self.shift = 0.0
+
+    def solve(self) -> Equilibrium:
+        begin = perf_counter()
+        converged = self._mixed() if self.options.mixed else self._descend(self.options.max_iterations)
+        while True:
+            while not converged:
+                self._check_budget()
+                converged = self._descend(self.options.patience)
+                if not converged and self.options.mixed:
+                    self.system.predicted_stress[:] = self.system.stress()
+                    converged = self._mixed()
+            energy = self.system.assemble(self.state)
+            residual, _ = self._residual()
+            negative = self.system.factorise()
+            border = border_of(self.system)
+            if is_convex(negative, border):
+                break
+            self._leave_saddle(energy)
+            converged = self._descend(self.options.max_iterations)
+        self.system.factorised_at = self.state
+        return Equilibrium(
+            state=self.state, q=np.array(self.q, float), opening=self.opening,
+            torque=self.torque, stress=self.system.stress(), elastic_energy=energy.elastic, potential=energy.potential,
+            iterations=self.iterations, residual=self._relative(residual), escapes=self.escapes,
+            wall_s=perf_counter() - begin,
+        )
+
+    # -- phases ----------------------------------------------------------------------------------------------------
+    def _mixed(self) -> bool:
+        """Mixed-stress iterations until they converge or stop making headway; the best state is kept then."""
+        system, options = self.system, self.options
+        best, kept, since = np.inf, (self.state, self.torque), 0
+        while True:
+            energy = system.assemble(self.state, mixed=True)
+            residual, gap = self._residual()
+            if self._converged(residual, gap):
+                return True
+            merit = self._merit(residual, gap)
+            since += 1
+            if merit < 0.5 * best:
+                best, kept, since = merit, (self.state, self.torque), 0
+            if not np.isfinite(energy.potential) or since > options.patience:
+                self.state, self.torque = kept
+                return False
+            self._check_budget()
+            self.shift, border = factorise_convex(system, 0.0 if self.shift == 0 else self.shift / 16)
+            step, change = bordered_solve(system, border, -residual, -gap)
+            scale = self._capped(step)
+            system.predict_stress(scale * step)
+            self.state = self.state.moved(system.increment(scale * step))
+            self.torque += scale * change
+
+    def _descend(self, limit: int) -> bool:
+        """Newton on the energy with shift and Armijo line search; at most `limit` accepted steps."""
+        system = self.system
+        self._close_gap()
+        energy = system.assemble(self.state)
+        shift = 0.0
+        for _ in range(limit):
+            residual, gap = self._residual()
+            shift, border = factorise_convex(system, shift)
+            if border is not None:
+                # the multiplier that fits the energy's gradient best: after the gap is closed only it is unknown
+                self.torque = -float(system.gradient[: system.n_unknowns] @ border.column) / border.schur
+                residual, gap = self._residual()
+            if self._converged(residual, gap):
+                return True
+            self._check_budget()
+            step, _ = bordered_solve(system, border, -residual, -gap)
+            scale = self._line_search(step, self._capped(step), float(residual @ step), energy)
+            if scale == 0.0:
+                if shift == 0.0:
+                    return self._merit(residual, gap) < 1.0
+                shift *= 8
+                if shift > 1e12 * float(np.median(np.abs(system.values[system.sparsity.diagonal]))):
+                    return False
+                continue
+            self.state = self.state.moved(system.increment(scale * step))
+            shift = 0.0 if scale >= 0.5 else shift
+            energy = system.assemble(self.state)
+        return self._converged(*self._residual())
+
+    def _line_search(self, step: np.ndarray, scale: float, slope: float, energy: Energy) -> float:
+        """Backtracking on the potential (on the residual where no potential exists); 0 when nothing was gained."""
+        system = self.system
+        floor = 1e-14 * abs(energy.potential)
+        while scale > 1e-8:
+            state = self.state.moved(system.increment(scale * step))
+            if not system.conservative:
+                return scale
+            potential = system.assemble(state, ENERGY).potential
+            if potential <= energy.potential + 1e-4 * scale * slope + floor:
+                return scale
+            scale *= 0.5
+        return 0.0
+
+    def _leave_saddle(self, energy: Energy) -> None:
+        """Move downhill along the softest mode of an unstable equilibrium."""
+        from .stability import softest_mode
+
+        self.escapes += 1
+        if self.escapes > self.options.escapes:
+            raise SimulationFailure(f"still unstable after leaving {self.escapes - 1} saddles")
+        mode = softest_mode(self.system).vector
+        side = self.options.side
+        if side is not None and side @ mode < 0 or side is None and mode[np.argmax(np.abs(mode))] < 0:
+            mode = -mode
+        mode = mode * (self.options.escape_rotation / np.abs(mode[self.system.is_rotation]).max())
+        trials = []
+        for scale in (1.0, -1.0, 0.1, -0.1):
+            state = self.state.moved(self.system.increment(scale * mode))
+            drop = self.system.assemble(state, ENERGY).potential - energy.potential
+            trials.append((drop, state))
+            # the preferred side is taken unless the other one is clearly lower
+            if len(trials) == 2 and min(t[0] for t in trials) < 0:
+                break
+        drop, self.state = trials[0] if trials[0][0] < 0.9 * min(t[0] for t in trials) else min(trials, key=lambda t: t[0])
+        log.debug("left a saddle: energy change %.3g", drop)
+
+    # -- measures --------------------------------------------------------------------------------------------------
+    def _residual(self) -> tuple[np.ndarray, float]:
+        """Residual (n_free,) of the state assembled last, and how far its mean angle is from the opening."""
+        system = self.system
+        residual = system.gradient[: system.n_unknowns]
+        if system.constraint is None:
+            return residual, 0.0
+        return residual + self.torque * system.constraint, self._gap()
+
+    def _gap(self) -> float:
+        return float(self.state.angles[self.system.scene.actuated].mean() - self.opening)
+
+    def _largest(self, residual: np.ndarray) -> float:
+        """Largest residual force, moments divided by the length scale."""
+        return float(np.max(np.abs(residual) * self.system.force_weight, initial=0.0))
+
+    def _merit(self, residual: np.ndarray, gap: float) -> float:
+        """Residual over its tolerance; converged at 1."""
+        force, noise = self.system.force_scale()
+        allowed = self.options.tolerance * force + 40 * noise
+        return max(self._largest(residual) / allowed, abs(gap) / 1e-11)
+
+    def _relative(self, residual: np.ndarray) -> float:
+        force, noise = self.system.force_scale()
+        return self._largest(residual) / max(force, noise, np.finfo(float).tiny)
+
+    def _converged(self, residual: np.ndarray, gap: float) -> bool:
+        return self._merit(residual, gap) <= 1.0
+
+    def _capped(self, step: np.ndarray) -> float:
+        turn = np.abs(step[self.system.is_rotation]).max(initial=0.0)
+        return min(1.0, self.options.rotation_cap / max(turn, np.finfo(float).tiny))
+
+    def _close_gap(self) -> None:
+        """Spread what the mean angle lacks over all actuated hinges: descent keeps the equation satisfied."""
+        if self.system.constraint is None:
+            return
+        angles = self.state.angles.copy()
+        angles[self.system.scene.actuated] -= self._gap()
+        self.state = State(self.state.positions, self.state.rotations, angles)
+
+    def _check_budget(self) -> None:
+        if self.iterations >= self.options.max_iterations:
+            raise SimulationFailure(f"no equilibrium within {self.options.max_iterations} Newton iterations")
+        self.iterations += 1

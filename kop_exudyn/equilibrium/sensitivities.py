@@ -1,0 +1,239 @@
+"""Derivatives of an equilibrium in the parameters, from its own factorisation: adjoint and full, no differences.
+
+At equilibrium R(x, q) + tau c = 0 and c.x fixed, so x_q solves K x_q + c tau_q = -R_q, c.x_q = 0. R_q is sparse:
+B^T dsigma/dL for a rest length, the Hessian's own columns for a driven unknown.
+"""
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..rods.element import length_derivative
+from ..rods.rotations import rotation_z
+from ..scene.scene import Scene
+from ..scene.state import State
+from .direction import border_of, bordered_solve
+from .newton import Equilibrium, Start
+from .system import System
+
+# Relative residual of the linear solves beyond which derivatives are worthless.
+_TRUSTED_RESIDUAL = 1e-6
+
+
+class Sensitivities:
+    """All first derivatives of one equilibrium, and the exact second derivatives of its potential energy.
+
+    Nothing is computed before it is asked for. Uses (and if need be restores) the factorisation in the system.
+    """
+
+    def __init__(self, system: System, equilibrium: Equilibrium):
+        self.system, self.equilibrium = system, equilibrium
+        if system.factorised_at is not equilibrium.state:
+            system.set_parameters(equilibrium.q)
+            system.assemble(equilibrium.state)
+            system.factorise()
+            system.factorised_at = equilibrium.state
+        self._border = border_of(system)
+        scene, s = system.scene, system.sparsity
+        self._strain = system.strain.copy()
+        energy_L, stress_L, self._energy_LL = length_derivative(
+            self._strain, system.lengths, scene.stiffness, scene.rest_strain)
+        self._energy_L, self._stress_L = energy_L, stress_L
+        self._has = np.flatnonzero(scene.length_parameter >= 0)
+        self._coupling = s.driven_columns(system.values.copy())
+        self._gradient = system.gradient.copy()
+        self._B = system.strain_displacement  # copied only if the system moves on, see _stress_change
+        self._residual_q = self._assemble_residual_q()
+
+    # -- states ----------------------------------------------------------------------------------------------------
+    @cached_property
+    def full(self) -> np.ndarray:
+        """x_q (n_free, n_parameters): all free unknowns in all parameters; angles in rad, translations global."""
+        x_q, torque_q = bordered_solve(self.system, self._border, -self._residual_q[: self._n].toarray())
+        self._torque_q = np.asarray(torque_q)
+        return x_q
+
+    def rows(self, dofs: np.ndarray) -> np.ndarray:
+        """Derivatives (m, n_parameters) of any unknowns of the scene, pinned (zero) and driven ones included."""
+        kept = self.system.sparsity.kept[dofs]
+        out = np.zeros((len(kept), self.system.scene.n_parameters))
+        free = (kept >= 0) & (kept < self._n)
+        out[free] = self.full[kept[free]]
+        driven = kept >= self._n
+        out[driven] = self._driven_map[kept[driven] - self._n].toarray()
+        return out
+
+    def positions(self, bodies: np.ndarray) -> np.ndarray:
+        """Derivatives (3 m, n_parameters) of body positions (m,), x y z after each other a body."""
+        return self.rows((6 * np.asarray(bodies)[:, None] + np.arange(3)).ravel())
+
+    def angles(self, hinges: np.ndarray) -> np.ndarray:
+        """Derivatives (m, n_parameters) of hinge angles."""
+        return self.rows(6 * self.system.scene.n_bodies + np.asarray(hinges))
+
+    @cached_property
+    def torque_gradient(self) -> np.ndarray:
+        """Derivative (n_parameters,) of the actuation's multiplier."""
+        self.full
+        return np.broadcast_to(self._torque_q, (self.system.scene.n_parameters,)).copy()
+
+    @cached_property
+    def opening_derivative(self) -> tuple[np.ndarray, float]:
+        """Derivatives of the free unknowns (n_free,) and of the torque in the opening angle."""
+        if self._border is None:
+            raise ValueError("the scene has no opening angle")
+        d, t = bordered_solve(self.system, self._border, np.zeros(self._n), 1.0)
+        return d, float(t)
+
+    def adjoint(self, dofs: np.ndarray, cotangent: np.ndarray) -> np.ndarray:
+        """Gradient (n_parameters,) of J given dJ/d(unknowns) (m,) at some unknowns: one solve, no x_q."""
+        kept = self.system.sparsity.kept[dofs]
+        load = np.zeros(self._n + self.system.sparsity.n_driven)
+        np.add.at(load, kept[kept >= 0], np.asarray(cotangent, float)[kept >= 0])
+        multiplier, _ = bordered_solve(self.system, self._border, load[: self._n])
+        return -(self._residual_q[: self._n].T @ multiplier) + self._driven_map.T @ load[self._n:]
+
+    # -- energies --------------------------------------------------------------------------------------------------
+    @cached_property
+    def potential_gradient(self) -> np.ndarray:
+        """d(potential)/dq (n_parameters,): by the envelope theorem only the explicit part counts."""
+        explicit = self._by_parameter(self._energy_L + self._weight_energy_L())
+        return explicit + self._driven_map.T @ self._gradient[self._n:]
+
+    @cached_property
+    def energy_gradient(self) -> np.ndarray:
+        """d(elastic energy)/dq (n_parameters,), the work of loads and actuators taken out by one adjoint solve."""
+        if not self._loaded:
+            return self.potential_gradient
+        gradient = self._elastic_gradient()
+        multiplier, _ = bordered_solve(self.system, self._border, gradient[: self._n])
+        return (self._by_parameter(self._energy_L) + self._driven_map.T @ gradient[self._n:]
+                - self._residual_q[: self._n].T @ multiplier)
+
+    @cached_property
+    def potential_hessian(self) -> np.ndarray:
+        """Exact d2(potential)/dq2 (n_parameters, n_parameters): Pi_qq + Pi_qx x_q."""
+        scene, n = self.system.scene, self._n
+        twice = np.zeros(scene.n_parameters)
+        factor = scene.length_factor[self._has]
+        np.add.at(twice, scene.length_parameter[self._has], factor**2 * self._energy_LL[self._has])
+        explicit = np.diag(twice)
+        driven = self._driven_map
+        if driven.shape[0]:
+            upper = self._coupling[1]
+            block = upper + sp.triu(upper, 1).T
+            lengths_driven = (driven.T @ self._length_residual[n:]).toarray()
+            explicit += lengths_driven + lengths_driven.T + (driven.T @ block @ driven).toarray()
+        hessian = explicit + self._residual_q[:n].T @ self.full
+        return 0.5 * (hessian + hessian.T)
+
+    @property
+    def energy_hessian(self) -> np.ndarray:
+        """Exact d2(elastic energy)/dq2 of an unloaded scene; of a loaded one the potential's, a model of it."""
+        return self.potential_hessian
+
+    # -- use -------------------------------------------------------------------------------------------------------
+    def predict(self, dq: np.ndarray, dopening: float = 0.0) -> Start:
+        """First-order prediction of the equilibrium at q + dq and opening + dopening: one solve."""
+        system, eq = self.system, self.equilibrium
+        rhs = -(self._residual_q[: self._n] @ dq)
+        step, change = bordered_solve(system, self._border, rhs, dopening if self._border is not None else 0.0)
+        kept = np.concatenate([step, self._driven_map @ dq])
+        return Start(eq.state.moved(system.increment(step)), eq.torque + float(change),
+                     eq.stress + self._stress_change(kept, dq))
+
+    @cached_property
+    def trusted(self) -> bool:
+        """Whether the factorisation is good enough for derivatives: False close to a bifurcation or limit point."""
+        probe = np.asarray(self._residual_q[: self._n].sum(axis=1)).ravel()
+        size = np.abs(probe).max(initial=0.0)
+        if size == 0.0:
+            return True
+        if self.system.factorised_at is not self.equilibrium.state:
+            return False
+        d, t = bordered_solve(self.system, self._border, probe)
+        residual = self.system.multiply(d) - probe
+        if self._border is not None:
+            residual = residual + self.system.constraint * t
+        return bool(np.isfinite(residual).all() and np.abs(residual).max() <= _TRUSTED_RESIDUAL * size)
+
+    # -- pieces ----------------------------------------------------------------------------------------------------
+    @property
+    def _n(self) -> int:
+        return self.system.n_unknowns
+
+    @property
+    def _loaded(self) -> bool:
+        return bool(self.system.scene.terms) or self.system.scene.weight is not None
+
+    @cached_property
+    def _driven_map(self) -> sp.csr_matrix:
+        """d(driven unknowns)/dq (n_driven, n_parameters)."""
+        d = self.system.scene.driven
+        return sp.csr_matrix((d.factors, (np.arange(len(d.dofs)), d.parameters)),
+                             shape=(len(d.dofs), self.system.scene.n_parameters))
+
+    def _by_parameter(self, per_element: np.ndarray) -> np.ndarray:
+        """Sum element values (E,), derivatives in the rest length, into their parameters."""
+        scene, has = self.system.scene, self._has
+        return np.bincount(scene.length_parameter[has], scene.length_factor[has] * per_element[has],
+                           minlength=scene.n_parameters)
+
+    def _assemble_residual_q(self) -> sp.csc_matrix:
+        """R_q (n_kept, n_parameters)."""
+        scene, s, has = self.system.scene, self.system.sparsity, self._has
+        block = np.einsum("eri,er->ei", self._B[has], self._stress_L[has])
+        if scene.weight is not None:
+            block += _weight_gradient_per_length(scene, self.equilibrium.state)[has]
+        rows, keep = s.rows[has], s.rows[has] >= 0
+        columns = np.broadcast_to(scene.length_parameter[has][:, None], rows.shape)
+        values = block * scene.length_factor[has][:, None]
+        shape = (s.n_free + s.n_driven, scene.n_parameters)
+        self._length_residual = sp.csc_matrix((values[keep], (rows[keep], columns[keep])), shape=shape)
+        if not s.n_driven:
+            return self._length_residual
+        free_driven, upper = self._coupling
+        block = sp.vstack([free_driven, upper + sp.triu(upper, 1).T])
+        return (self._length_residual + block @ self._driven_map).tocsc()
+
+    def _stress_change(self, kept: np.ndarray, dq: np.ndarray) -> np.ndarray:
+        """First-order change (E, 6) of the generalised stresses, for an increment of the kept unknowns and of q."""
+        scene, s = self.system.scene, self.system.sparsity
+        increment = np.append(kept, 0.0)[s.rows]  # absent unknowns (-1) read the appended zero
+        change = np.einsum("eri,ei->er", self._B, increment) * scene.stiffness / self.system.lengths[:, None]
+        has = self._has
+        change[has] += self._stress_L[has] * (scene.length_factor[has] * dq[scene.length_parameter[has]])[:, None]
+        return change
+
+    def _weight_energy_L(self) -> np.ndarray | float:
+        """d(load potential)/dL (E,) of dead loads: -w.(x_0 + x_1)/2."""
+        scene = self.system.scene
+        if scene.weight is None:
+            return 0.0
+        x = scene.node_poses(self.equilibrium.state)[0]
+        return -0.5 * np.einsum("ei,ei->e", scene.weight, x[scene.elements[:, 0]] + x[scene.elements[:, 1]])
+
+    def _elastic_gradient(self) -> np.ndarray:
+        """d(elastic energy)/d(kept unknowns) at the equilibrium."""
+        s, scene = self.system.sparsity, self.system.scene
+        stress = scene.stiffness * self._strain / self.system.lengths[:, None]
+        block = np.einsum("eri,er->ei", self._B, stress)
+        keep = s.rows >= 0
+        return np.bincount(s.rows[keep], block[keep], minlength=s.n_free + s.n_driven)
+
+
+def _weight_gradient_per_length(scene: Scene, state: State) -> np.ndarray:
+    """d/dL (E, 14) of the dead load's generalised forces on an element's unknowns."""
+    half = -0.5 * scene.weight
+    out = np.zeros((len(scene.elements), 14))
+    for end in range(2):
+        node = scene.elements[:, end]
+        Rb = state.rotations[scene.node_body[node]]
+        y = np.einsum("nij,nj->ni", rotation_z(scene.node_angles(state)[node]), scene.node_offset[node])
+        force = np.einsum("nji,nj->ni", Rb, half)
+        out[:, 7 * end: 7 * end + 3] = half
+        out[:, 7 * end + 3: 7 * end + 6] = np.cross(y, force)
+        out[:, 7 * end + 6] = (y[:, 0] * force[:, 1] - y[:, 1] * force[:, 0]) * (scene.node_hinge[node] >= 0)
+    return out

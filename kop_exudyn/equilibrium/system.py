@@ -1,0 +1,180 @@
+"""A scene's equations: gradient, Hessian and factorisation, with all arrays made once a topology."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from ..scene.assembly import ENERGY, GRADIENT, HESSIAN, assemble_rods, predict_stress, scatter_blocks
+from ..scene.scene import Scene
+from ..scene.sparsity import sparsity_of
+from ..scene.state import State
+from .factorisation import Factorisation
+
+
+@dataclass
+class Counters:
+    """What a system was asked to do, for profiles and for tests that count calls. Seconds are wall time."""
+
+    energies: int = 0
+    gradients: int = 0
+    hessians: int = 0
+    factorisations: int = 0
+    solves: int = 0
+    assembly_s: float = 0.0
+    factorisation_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Energy:
+    """elastic : strain energy of the rods; potential : elastic plus loads, attraction and actuators."""
+
+    elastic: float
+    potential: float
+
+
+class System:
+    """Solver workspace of one scene. Not to be shared between threads or processes.
+
+    After `assemble`, `gradient` (n_kept,), `values`, `strain` (E, 6) and `strain_displacement` (E, 6, 14) belong to
+    the state assembled last.
+    """
+
+    def __init__(self, scene: Scene):
+        self.scene = scene
+        self.sparsity = s = sparsity_of(scene)
+        n_elements = len(scene.elements)
+        self.values = np.zeros(s.n_values)
+        self.gradient = np.zeros(s.n_free + s.n_driven)
+        self.strain = np.zeros((n_elements, 6))
+        self.strain_displacement = np.zeros((n_elements, 6, 14))
+        self.predicted_stress = np.zeros((n_elements, 6))
+        self.lengths = scene.length_constant.copy()
+        self.factorisation = Factorisation()
+        self.counters = Counters()
+        self._weight = scene.weight if scene.weight is not None else np.zeros((0, 3))
+        self._matrix = s.free_matrix(self.values)
+        self._plain = scene.plain_nodes
+        self.metric = self._metric()
+        self.constraint = self._constraint()
+        self.factorised_at: State | None = None  # where the unshifted, unmixed Hessian at hand was factorised
+        self.is_rotation = self._dof_is_rotation()[s.free]
+        self.force_weight = np.where(self.is_rotation, 1 / scene.length_scale, 1.0)  # moments count as forces
+
+    @property
+    def n_unknowns(self) -> int:
+        return self.sparsity.n_free
+
+    @property
+    def conservative(self) -> bool:
+        """Whether a potential exists (a spatial moment has none)."""
+        return all(getattr(term, "conservative", True) for term in self.scene.terms)
+
+    def set_parameters(self, q: np.ndarray) -> None:
+        """Take the rest lengths of q; raises SimulationFailure unless they are positive."""
+        self.lengths = self.scene.rest_lengths(q)
+
+    def assemble(self, state: State, order: int = HESSIAN, mixed: bool = False) -> Energy:
+        """Energy, and up to the order asked for gradient and Hessian, at a state.
+
+        mixed : take the geometric stiffness at `predicted_stress` instead of the state's own stress
+        """
+        begin = perf_counter()
+        scene, s, count = self.scene, self.sparsity, self.counters
+        self.factorised_at = None
+        if order >= GRADIENT:
+            self.gradient[:] = 0.0
+        if order == HESSIAN:
+            self.values[:] = 0.0
+        elastic, load = assemble_rods(
+            order, state.positions, state.rotations, state.angles, scene.node_body, scene.node_hinge, self._plain,
+            scene.node_frame, scene.node_offset, scene.elements, self.lengths, scene.rest_strain, scene.stiffness,
+            self._weight, self.predicted_stress, mixed, s.rows, s.slots, self.gradient, self.values, self.strain,
+            self.strain_displacement,
+        )
+        potential = elastic + load
+        for term, rows, slots in zip(scene.terms, s.term_rows, s.term_slots):
+            if order == ENERGY:
+                potential += term.energy(state)
+            else:
+                energy, g, H = term.gradient_hessian(state)
+                potential += energy
+                scatter_blocks(rows, slots, g, H, order == HESSIAN, self.gradient, self.values)
+        count.energies += order == ENERGY
+        count.gradients += order == GRADIENT
+        count.hessians += order == HESSIAN
+        count.assembly_s += perf_counter() - begin
+        return Energy(elastic, potential)
+
+    def predict_stress(self, increment: np.ndarray) -> None:
+        """Store the stress that the increment (n_free,) leads to, linearised at the state assembled last."""
+        kept = np.zeros(len(self.gradient))
+        kept[: self.sparsity.n_free] = increment
+        predict_stress(self.strain, self.strain_displacement, self.sparsity.rows, kept, self.scene.stiffness,
+                       self.lengths, self.predicted_stress)
+
+    def stress(self) -> np.ndarray:
+        """Generalised stresses (E, 6) of the state assembled last."""
+        return self.scene.stiffness * self.strain / self.lengths[:, None]
+
+    def factorise(self, shift: float = 0.0) -> int:
+        """Factorise the assembled Hessian plus shift times the metric; returns how many pivots are not positive."""
+        begin = perf_counter()
+        if shift:
+            diagonal = self.values[self.sparsity.diagonal]
+            self.values[self.sparsity.diagonal] = diagonal + shift * self.metric
+        negative = self.factorisation.update(self._matrix)
+        if shift:
+            self.values[self.sparsity.diagonal] = diagonal
+        self.factorised_at = None
+        self.counters.factorisations += 1
+        self.counters.factorisation_s += perf_counter() - begin
+        return negative
+
+    def solve(self, rhs: np.ndarray) -> np.ndarray:
+        """K^-1 rhs with the factorisation at hand; rhs (n_free,) or (n_free, k)."""
+        self.counters.solves += 1 if rhs.ndim == 1 else rhs.shape[1]
+        return self.factorisation.solve(rhs)
+
+    def multiply(self, v: np.ndarray) -> np.ndarray:
+        """K v with the assembled Hessian over the free unknowns."""
+        U = self._matrix
+        return U @ v + U.T @ v - self.values[self.sparsity.diagonal] * v
+
+    def increment(self, free: np.ndarray) -> np.ndarray:
+        """An increment (n_dofs,) of all unknowns from one of the free ones."""
+        full = np.zeros(self.scene.n_dofs)
+        full[self.sparsity.free] = free
+        return full
+
+    def force_scale(self) -> tuple[float, float]:
+        """Largest internal force of the state assembled last, and the round-off level of its forces.
+
+        Moments count divided by the length scale. Round-off: coordinates of size s leave strains of about
+        eps s / L, hence forces of eps s EA / L.
+        """
+        scene = self.scene
+        stress = np.abs(self.stress())
+        stress[:, 3:] /= scene.length_scale
+        noise = np.finfo(float).eps * scene.size * np.max(scene.stiffness[:, 0] / self.lengths)
+        return float(stress.max()), float(noise)
+
+    def _dof_is_rotation(self) -> np.ndarray:
+        rotation = np.ones(self.scene.n_dofs, bool)
+        rotation[: 6 * self.scene.n_bodies].reshape(-1, 6)[:, :3] = False
+        return rotation
+
+    def _metric(self) -> np.ndarray:
+        """1 for rotations, 1 / length_scale^2 for translations: makes a shift independent of units."""
+        metric = np.where(self._dof_is_rotation(), 1.0, self.scene.length_scale**-2)
+        return metric[self.sparsity.free]
+
+    def _constraint(self) -> np.ndarray | None:
+        """Derivative (n_free,) of the mean actuated angle, or None without actuation."""
+        if self.scene.actuated is None:
+            return None
+        row = np.zeros(self.sparsity.n_free)
+        place = self.sparsity.kept[6 * self.scene.n_bodies + self.scene.actuated]
+        row[place] = 1 / len(place)
+        return row

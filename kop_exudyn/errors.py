@@ -1,0 +1,68 @@
+"""The two ways in which a request can go wrong: bad input, and a simulation that finds no equilibrium."""
+from __future__ import annotations
+
+from typing import Any
+
+
+class InputError(ValueError):
+    """Input that can't be used: says which file, which field and which value.
+
+    Parameters
+    ----------
+    message : what is wrong, one sentence without the place
+    source : file (or other origin) of the input
+    field : dotted path of the offending field, as ``curves[3].points``
+    value : the offending value
+    """
+
+    def __init__(self, message: str, *, source: Any = None, field: str | None = None, value: Any = None):
+        self.message, self.source, self.field, self.value = message, source, field, value
+        super().__init__(str(self))
+
+    def __str__(self) -> str:
+        parts = [str(self.source)] if self.source is not None else []
+        if self.field is not None:
+            shown = "" if self.value is None else f" = {_short(self.value)}"
+            parts.append(f"{self.field}{shown}")
+        return ": ".join([*parts, self.message])
+
+    def at(self, source: Any) -> InputError:
+        """The same error, with the file that it came from filled in where it was unknown."""
+        return InputError(self.message, source=self.source or source, field=self.field, value=self.value)
+
+    def __reduce__(self):
+        return _rebuild_input_error, (self.message, self.source, self.field, self.value)
+
+
+def _rebuild_input_error(message, source, field, value):
+    return InputError(message, source=source, field=field, value=value)
+
+
+class SimulationFailure(RuntimeError):
+    """No acceptable equilibrium was found. Callers record it as data: which state, and why.
+
+    Parameters
+    ----------
+    reason : what happened, one sentence
+    where : what was solved, as ``spiral: deployed state``
+    """
+
+    def __init__(self, reason: str, *, where: str | None = None):
+        self.reason, self.where = reason, where
+        super().__init__(reason if where is None else f"{where}: {reason}")
+
+    def within(self, where: str) -> SimulationFailure:
+        """The same failure, named by the wider context that it happened in."""
+        return SimulationFailure(self.reason, where=where if self.where is None else f"{where}: {self.where}")
+
+    def __reduce__(self):
+        return _rebuild_failure, (self.reason, self.where)
+
+
+def _rebuild_failure(reason, where):
+    return SimulationFailure(reason, where=where)
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,247 @@
+"""Compiled assembly of a scene's rods: energy, gradient and Hessian straight into the factorisation's arrays."""
+from __future__ import annotations
+
+import math
+
+import numba as nb
+import numpy as np
+
+from ..rods.element import element_energy, element_hessian, strain_displacement
+from ..rods.rotations import bend_coefficient
+
+ENERGY, GRADIENT, HESSIAN = 0, 1, 2
+
+
+@nb.njit(cache=True)
+def node_pose(xb, Rb, a, plain, C, o, x, R, ZC, y):
+    """Pose (x, R) of a node, with ZC = Z(a) C and y = Z(a) o left behind for the variations."""
+    if plain:
+        for r in range(3):
+            x[r] = xb[r]
+            for c in range(3):
+                R[r, c] = Rb[r, c]
+        return
+    co, si = math.cos(a), math.sin(a)
+    y[0], y[1], y[2] = co * o[0] - si * o[1], si * o[0] + co * o[1], o[2]
+    for c in range(3):
+        ZC[0, c] = co * C[0, c] - si * C[1, c]
+        ZC[1, c] = si * C[0, c] + co * C[1, c]
+        ZC[2, c] = C[2, c]
+    for r in range(3):
+        x[r] = xb[r] + Rb[r, 0] * y[0] + Rb[r, 1] * y[1] + Rb[r, 2] * y[2]
+        for c in range(3):
+            R[r, c] = Rb[r, 0] * ZC[0, c] + Rb[r, 1] * ZC[1, c] + Rb[r, 2] * ZC[2, c]
+
+
+@nb.njit(cache=True)
+def node_map(Rb, hinged, C, ZC, y, T):
+    """T (6,7): node increments (dx, w) from body increments and hinge angle.
+
+    dx = dx_b - R_b hat(y) w_b + R_b (e_z x y) da,   w = (ZC)^T w_b + C^T e_z da
+    """
+    h = 1.0 if hinged else 0.0
+    for r in range(3):
+        for c in range(3):
+            T[r, c] = 1.0 if r == c else 0.0
+            T[3 + r, c] = 0.0
+            T[3 + r, 3 + c] = ZC[c, r]
+        T[r, 3] = -(Rb[r, 1] * y[2] - Rb[r, 2] * y[1])
+        T[r, 4] = -(Rb[r, 2] * y[0] - Rb[r, 0] * y[2])
+        T[r, 5] = -(Rb[r, 0] * y[1] - Rb[r, 1] * y[0])
+        T[r, 6] = h * (Rb[r, 1] * y[0] - Rb[r, 0] * y[1])
+        T[3 + r, 6] = h * C[2, r]
+
+
+@nb.njit(cache=True)
+def transform_columns(M, n_rows, at6, plain, T, out, at7):
+    """out[:, at7:at7+7] = M[:, at6:at6+6] T, for the first n_rows rows."""
+    for r in range(n_rows):
+        if plain:
+            for c in range(6):
+                out[r, at7 + c] = M[r, at6 + c]
+            out[r, at7 + 6] = 0.0
+            continue
+        for c in range(3):
+            out[r, at7 + c] = M[r, at6 + c]
+        for c in range(3, 7):
+            v = 0.0
+            for k in range(6):
+                v += M[r, at6 + k] * T[k, c]
+            out[r, at7 + c] = v
+
+
+@nb.njit(cache=True)
+def transform_rows(M, at6, plain, T, out, at7):
+    """out[at7:at7+7, :] = T^T M[at6:at6+6, :], for 14 columns."""
+    for c in range(14):
+        if plain:
+            for r in range(6):
+                out[at7 + r, c] = M[at6 + r, c]
+            out[at7 + 6, c] = 0.0
+            continue
+        for r in range(3):
+            out[at7 + r, c] = M[at6 + r, c]
+        for r in range(3, 7):
+            v = 0.0
+            for k in range(6):
+                v += T[k, r] * M[at6 + k, c]
+            out[at7 + r, c] = v
+
+
+@nb.njit(cache=True)
+def map_curvature(Rb, hinged, C, ZC, y, force, moment, H, at):
+    """Add the second variation of the node map, contracted with the node's force (global) and moment (node axes).
+
+    f = R_b^T force:  w.(f y^T)w - (f.y) w.w,  w.((e_z x y) x f) da,  f.(e_z x (e_z x y)) da^2,
+    and half of w.ZC (C^T e_z x moment) da.
+    """
+    f0 = Rb[0, 0] * force[0] + Rb[1, 0] * force[1] + Rb[2, 0] * force[2]
+    f1 = Rb[0, 1] * force[0] + Rb[1, 1] * force[1] + Rb[2, 1] * force[2]
+    f2 = Rb[0, 2] * force[0] + Rb[1, 2] * force[1] + Rb[2, 2] * force[2]
+    fy = f0 * y[0] + f1 * y[1] + f2 * y[2]
+    H[at + 3, at + 3] += f0 * y[0] - fy
+    H[at + 4, at + 4] += f1 * y[1] - fy
+    H[at + 5, at + 5] += f2 * y[2] - fy
+    H[at + 3, at + 4] += 0.5 * (f0 * y[1] + f1 * y[0])
+    H[at + 3, at + 5] += 0.5 * (f0 * y[2] + f2 * y[0])
+    H[at + 4, at + 5] += 0.5 * (f1 * y[2] + f2 * y[1])
+    if not hinged:
+        return
+    b0, b1, b2 = C[2, 0], C[2, 1], C[2, 2]
+    t0 = b1 * moment[2] - b2 * moment[1]
+    t1 = b2 * moment[0] - b0 * moment[2]
+    t2 = b0 * moment[1] - b1 * moment[0]
+    # (e_z x y) x f with e_z x y = (-y1, y0, 0)
+    H[at + 3, at + 6] += y[0] * f2 + 0.5 * (ZC[0, 0] * t0 + ZC[0, 1] * t1 + ZC[0, 2] * t2)
+    H[at + 4, at + 6] += y[1] * f2 + 0.5 * (ZC[1, 0] * t0 + ZC[1, 1] * t1 + ZC[1, 2] * t2)
+    H[at + 5, at + 6] += -y[1] * f1 - y[0] * f0 + 0.5 * (ZC[2, 0] * t0 + ZC[2, 1] * t1 + ZC[2, 2] * t2)
+    H[at + 6, at + 6] -= f0 * y[0] + f1 * y[1]
+
+
+@nb.njit(cache=True)
+def assemble_rods(
+    order, positions, rotations, angles, node_body, node_hinge, plain, frame, offset, elements, L, gamma, K, weight,
+    stress, mixed, rows, slots, gradient, values, strain, B14,
+):
+    """Elastic energy and load potential; at GRADIENT also the gradient, at HESSIAN also values, and B14 (E,6,14).
+
+    stress (E, 6) is used in the geometric part when mixed, else the current stress is. weight has no rows when the
+    scene has none. strain e (E, 6) is always written.
+    """
+    x0, x1, R0, R1 = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
+    Z0, Z1, y0, y1 = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.zeros(3)
+    T0, T1 = np.empty((6, 7)), np.empty((6, 7))
+    p, phi, R = np.empty(3), np.empty(3), np.empty((3, 3))
+    A, D, P, X, T = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 12)), np.empty((3, 12)), np.empty((5, 3, 3))
+    B, H, M, H14 = np.empty((6, 12)), np.empty((12, 12)), np.empty((12, 14)), np.zeros((14, 14))
+    G, sigma = np.empty(12), np.empty(6)
+    elastic = 0.0
+    potential = 0.0
+    weighted = weight.shape[0] > 0
+    for e in range(elements.shape[0]):
+        n0, n1 = elements[e, 0], elements[e, 1]
+        b0, b1, h0, h1 = node_body[n0], node_body[n1], node_hinge[n0], node_hinge[n1]
+        Rb0, Rb1 = rotations[b0], rotations[b1]
+        node_pose(positions[b0], Rb0, angles[h0] if h0 >= 0 else 0.0, plain[n0], frame[n0], offset[n0], x0, R0, Z0, y0)
+        node_pose(positions[b1], Rb1, angles[h1] if h1 >= 0 else 0.0, plain[n1], frame[n1], offset[n1], x1, R1, Z1, y1)
+        elastic += element_energy(x0, R0, x1, R1, L[e], gamma[e], K[e], p, phi, R, strain[e])
+        if weighted:
+            for k in range(3):
+                potential -= 0.5 * L[e] * weight[e, k] * (x0[k] + x1[k])
+        if order == ENERGY:
+            continue
+
+        for k in range(6):
+            sigma[k] = K[e, k] * strain[e, k] / L[e]
+        if order == GRADIENT:
+            c, c1, _ = bend_coefficient(phi[0] ** 2 + phi[1] ** 2 + phi[2] ** 2)
+            strain_displacement(R0, p, phi, c, c1, A, D, B)
+        else:
+            element_hessian(R0, L[e], K[e], p, phi, stress[e] if mixed else sigma, A, D, B, P, X, T, H)
+        for k in range(12):
+            G[k] = B[0, k] * sigma[0] + B[1, k] * sigma[1] + B[2, k] * sigma[2] \
+                + B[3, k] * sigma[3] + B[4, k] * sigma[4] + B[5, k] * sigma[5]
+        if weighted:
+            for k in range(3):
+                G[k] -= 0.5 * L[e] * weight[e, k]
+                G[6 + k] -= 0.5 * L[e] * weight[e, k]
+        plain0, plain1 = plain[n0], plain[n1]
+        if not plain0:
+            node_map(Rb0, h0 >= 0, frame[n0], Z0, y0, T0)
+        if not plain1:
+            node_map(Rb1, h1 >= 0, frame[n1], Z1, y1, T1)
+        scatter_gradient(G, 0, plain0, T0, rows[e, :7], gradient)
+        scatter_gradient(G, 6, plain1, T1, rows[e, 7:], gradient)
+        if order == GRADIENT:
+            continue
+
+        transform_columns(H, 12, 0, plain0, T0, M, 0)
+        transform_columns(H, 12, 6, plain1, T1, M, 7)
+        transform_rows(M, 0, plain0, T0, H14, 0)
+        transform_rows(M, 6, plain1, T1, H14, 7)
+        transform_columns(B, 6, 0, plain0, T0, B14[e], 0)
+        transform_columns(B, 6, 6, plain1, T1, B14[e], 7)
+        if mixed:
+            for k in range(12):
+                G[k] = 0.0
+                for r in range(6):
+                    G[k] += B[r, k] * stress[e, r]
+                if weighted and k % 6 < 3:
+                    G[k] -= 0.5 * L[e] * weight[e, k % 6]
+        if not plain0:
+            map_curvature(Rb0, h0 >= 0, frame[n0], Z0, y0, G[:3], G[3:6], H14, 0)
+        if not plain1:
+            map_curvature(Rb1, h1 >= 0, frame[n1], Z1, y1, G[6:9], G[9:12], H14, 7)
+        s = 0
+        for a in range(14):
+            for b in range(a, 14):
+                slot = slots[e, s]
+                if slot >= 0:
+                    values[slot] += H14[a, b]
+                s += 1
+    return elastic, potential
+
+
+@nb.njit(cache=True)
+def scatter_gradient(G, at, plain, T, rows, gradient):
+    """gradient[rows] += T^T G[at:at+6]."""
+    for c in range(7):
+        if rows[c] < 0:
+            continue
+        if plain:
+            v = G[at + c]
+        else:
+            v = 0.0
+            for k in range(6):
+                v += T[k, c] * G[at + k]
+        gradient[rows[c]] += v
+
+
+@nb.njit(cache=True)
+def scatter_blocks(rows, slots, g, H, second_order, gradient, values):
+    """Add a term's block gradients (m, k) and symmetric Hessians (m, k, k)."""
+    m, k = rows.shape
+    for e in range(m):
+        s = 0
+        for a in range(k):
+            if rows[e, a] >= 0:
+                gradient[rows[e, a]] += g[e, a]
+            if not second_order:
+                continue
+            for b in range(a, k):
+                slot = slots[e, s]
+                if slot >= 0:
+                    values[slot] += H[e, a, b] if a == b or rows[e, a] != rows[e, b] else 2 * H[e, a, b]
+                s += 1
+
+
+@nb.njit(cache=True)
+def predict_stress(strain, B14, rows, increment, K, L, stress):
+    """stress = (K/L) (e + B d), the stress that a linear step d (over the kept unknowns) leads to."""
+    for e in range(strain.shape[0]):
+        for r in range(6):
+            v = strain[e, r]
+            for c in range(14):
+                if rows[e, c] >= 0:
+                    v += B14[e, r, c] * increment[rows[e, c]]
+            stress[e, r] = K[e, r] * v / L[e]

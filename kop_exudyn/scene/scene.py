@@ -1,0 +1,164 @@
+"""A scene: bodies, hinges, rods, loads and actuators, and how they depend on the design parameters q.
+
+Bodies (hubs, corners, plates, free interior nodes) carry a pose. A rod's node sits on one body,
+x = x_b + R_b Z(a) o,  R = R_b Z(a) C,  with Z(a) a turn by the hinge angle a about the body's z axis. So coincident
+joints need no constraint equations: the unknowns are body increments and free hinge angles.
+
+Unknowns are numbered 6 body + 0..5 (global translation, then body-frame rotation), then 6 n_bodies + hinge.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..errors import SimulationFailure
+from ..rods.rotations import rotation_z
+from ..rods.sections import Section
+from .state import State
+
+
+@dataclass(frozen=True)
+class Driven:
+    """Unknowns that the parameters prescribe: value = constant + factor q[parameter].
+
+    dofs (m,) ; constants (m,) ; parameters (m,) ; factors (m,)
+    """
+
+    dofs: np.ndarray
+    constants: np.ndarray
+    parameters: np.ndarray
+    factors: np.ndarray
+
+
+@dataclass(frozen=True)
+class Chain:
+    """One rod piece as it is drawn and exported: its nodes in order, its elements, its cross-section."""
+
+    nodes: np.ndarray
+    elements: np.ndarray
+    section: Section | None = None
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is simulated; made by `SceneBuilder`.
+
+    initial : state to start from
+    node_body (N,), node_hinge (N,) (-1: none), node_frame (N, 3, 3), node_offset (N, 3)
+    elements (E, 2) nodes; stiffness (E, 6); rest_strain (E, 6)
+    length_constant, length_factor (E,), length_parameter (E,) (-1: none): rest length = constant + factor q[parameter]
+    weight (E, 3) : dead load per rest length, or None
+    driven : unknowns prescribed by parameters
+    pinned : (6 n_bodies + n_hinges,) bool, unknowns held at their initial value
+    actuated : hinges whose mean angle is prescribed ("opening"), or None
+    terms : loads, attraction, actuators
+    chains : rod pieces
+    """
+
+    n_parameters: int
+    initial: State
+    node_body: np.ndarray
+    node_hinge: np.ndarray
+    node_frame: np.ndarray
+    node_offset: np.ndarray
+    elements: np.ndarray
+    stiffness: np.ndarray
+    rest_strain: np.ndarray
+    length_constant: np.ndarray
+    length_factor: np.ndarray
+    length_parameter: np.ndarray
+    weight: np.ndarray | None
+    driven: Driven
+    pinned: np.ndarray
+    actuated: np.ndarray | None
+    terms: tuple[Any, ...]
+    chains: tuple[Chain, ...]
+
+    @property
+    def n_bodies(self) -> int:
+        return len(self.initial.positions)
+
+    @property
+    def n_hinges(self) -> int:
+        return len(self.initial.angles)
+
+    @property
+    def n_dofs(self) -> int:
+        """Unknowns before pins and driven ones are taken out."""
+        return 6 * self.n_bodies + self.n_hinges
+
+    def with_terms(self, *terms: Any) -> Scene:
+        """The same scene with these loads, attractions and actuators instead."""
+        return replace(self, terms=tuple(terms))
+
+    def with_weight(self, weight: np.ndarray | None) -> Scene:
+        """The same scene with this dead load (E, 3) per rest length."""
+        return replace(self, weight=weight)
+
+    def with_pins(self, pinned: np.ndarray) -> Scene:
+        """The same scene with these unknowns (n_dofs,) bool held instead."""
+        return replace(self, pinned=np.asarray(pinned, bool))
+
+    @cached_property
+    def plain_nodes(self) -> np.ndarray:
+        """(N,) bool: nodes that coincide with their body, axes included."""
+        return ((self.node_hinge < 0) & (self.node_offset == 0).all(1)
+                & (self.node_frame == np.eye(3)).all((1, 2)))
+
+    @cached_property
+    def length_scale(self) -> float:
+        """A length typical of the elements, from the initial geometry; makes tolerances independent of units."""
+        x = self.node_poses(self.initial)[0]
+        return float(np.median(np.linalg.norm(x[self.elements[:, 1]] - x[self.elements[:, 0]], axis=1)))
+
+    @cached_property
+    def size(self) -> float:
+        """Bounding-box diagonal of the initial nodes."""
+        return float(np.linalg.norm(np.ptp(self.node_poses(self.initial)[0], axis=0)))
+
+    def rest_lengths(self, q: np.ndarray) -> np.ndarray:
+        """Rest lengths (E,) at q (n_parameters,). Raises SimulationFailure unless all are positive."""
+        lengths = self.length_constant.copy()
+        has = self.length_parameter >= 0
+        lengths[has] += self.length_factor[has] * q[self.length_parameter[has]]
+        if not (lengths > 0).all():
+            worst = int(np.argmin(np.where(np.isnan(lengths), -np.inf, lengths)))
+            raise SimulationFailure(f"rest length of element {worst} is {lengths[worst]:.6g}, not positive")
+        return lengths
+
+    def driven_values(self, q: np.ndarray) -> np.ndarray:
+        """Values (m,) of the driven unknowns at q."""
+        d = self.driven
+        return d.constants + d.factors * q[d.parameters]
+
+    def with_driven(self, state: State, q: np.ndarray) -> State:
+        """The state with the driven unknowns set to their values at q."""
+        d, n = self.driven, 6 * self.n_bodies
+        if not len(d.dofs):
+            return state
+        values = self.driven_values(q)
+        hinge = d.dofs >= n
+        angles, positions = state.angles.copy(), state.positions.copy()
+        angles[d.dofs[hinge] - n] = values[hinge]
+        bodies = d.dofs[~hinge]
+        positions[bodies // 6, bodies % 6] = values[~hinge]
+        return State(positions, state.rotations, angles)
+
+    def node_angles(self, state: State) -> np.ndarray:
+        """Hinge angle (N,) at every node, 0 without a hinge."""
+        return np.where(self.node_hinge >= 0, np.append(state.angles, 0.0)[self.node_hinge], 0.0)
+
+    def node_poses(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (N, 3) and rotations (N, 3, 3) of all nodes."""
+        Rb = state.rotations[self.node_body]
+        turned = Rb @ rotation_z(self.node_angles(state))
+        x = state.positions[self.node_body] + np.einsum("nij,nj->ni", turned, self.node_offset)
+        return x, turned @ self.node_frame
+
+    def polylines(self, state: State) -> list[np.ndarray]:
+        """Node positions (k, 3) along every rod piece."""
+        x = self.node_poses(state)[0]
+        return [x[chain.nodes] for chain in self.chains]

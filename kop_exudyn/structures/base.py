@@ -1,0 +1,162 @@
+"""What every structure class offers to the kit and the optimiser: elements, states to solve, a target to fit.
+
+A structure class is one module in this folder that registers a `Design` subclass; nothing else has to change.
+"""
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Callable, ClassVar, Iterator, Mapping, TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InputError
+
+if TYPE_CHECKING:
+    from ..equilibrium.newton import Equilibrium
+    from ..equilibrium.system import System
+    from ..scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class ElementGroup:
+    """Elements of one kind and one number of parameters.
+
+    kind : name of the part kind that serves them ("linear", "angular", "cell", ...)
+    indices : (n, k) int, where the k parameters of each element stand in the design's parameters q
+    """
+
+    kind: str
+    indices: np.ndarray
+
+    def shifted(self, offset: int) -> ElementGroup:
+        """The same elements in a longer parameter vector (several designs after each other)."""
+        return ElementGroup(self.kind, self.indices + offset)
+
+
+@dataclass(frozen=True)
+class Target:
+    """The shape that a design should keep.
+
+    vertices (V, 3), faces (F, 3) : the target surface
+    positions (n_joints, 3) : where the joints were in the input design's deployed state
+    diagonal : length of the surface's bounding-box diagonal, l0
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    positions: np.ndarray
+    diagonal: float
+
+
+@dataclass(frozen=True)
+class Role:
+    """One equilibrium that the objective looks at.
+
+    name : "deployed" (fit and energy) or another name such as "rest" (energy only)
+    opening : prescribed mean hinge angle, or None without actuation
+    fitted : whether the joints of this state are compared with the target
+    """
+
+    name: str
+    opening: float | None = None
+    fitted: bool = False
+
+
+class Design(ABC):
+    """One bending-active structure, ready to be simulated for any value of its parameters q.
+
+    Attributes set by subclasses
+    ----------------------------
+    name : the design's name
+    parameters : (nq,) q of the input design
+    lower, upper : (nq,) bounds within which an element can exist at all (inf where free)
+    groups : the elements, a list of `ElementGroup`
+    roles : the states to solve; exactly one of them is fitted
+    joints : (n_joints,) body indices of the joints that are compared with the target
+    """
+
+    class_name: ClassVar[str]
+    name: str
+    parameters: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    groups: list[ElementGroup]
+    roles: tuple[Role, ...]
+    joints: np.ndarray
+
+    @abstractmethod
+    def scene(self, role: str) -> Scene:
+        """The scene of one of the roles; the same object at every call."""
+
+    @abstractmethod
+    def deploy(self, q: np.ndarray | None = None) -> dict[str, Equilibrium]:
+        """Equilibria of all roles from the design's own starting geometry (no warm start), at q (default: the input).
+
+        Raises SimulationFailure when one of them can't be reached.
+        """
+
+    @cached_property
+    @abstractmethod
+    def target(self) -> Target:
+        """The target; may need simulations of the input design, so it is computed at first use and kept."""
+
+    @property
+    def fitted_role(self) -> Role:
+        return next(role for role in self.roles if role.fitted)
+
+    @cached_property
+    def systems(self) -> dict[str, System]:
+        """Solver workspaces, one a role, made at first use."""
+        from ..equilibrium.system import System
+
+        return {role.name: System(self.scene(role.name)) for role in self.roles}
+
+    @property
+    def n_elements(self) -> int:
+        return sum(len(group.indices) for group in self.groups)
+
+
+Reader = Callable[[Mapping[str, Any], str], Design]
+_REGISTRY: dict[str, Reader] = {}
+
+
+def register(class_name: str) -> Callable[[Reader], Reader]:
+    """Decorator: the reader that makes a `Design` of a design file's content (a mapping) and its source name."""
+
+    def add(reader: Reader) -> Reader:
+        _REGISTRY[class_name] = reader
+        return reader
+
+    return add
+
+
+def registered() -> Iterator[str]:
+    """Names of all structure classes, those of this folder included."""
+    _load_folder()
+    return iter(sorted(_REGISTRY))
+
+
+def design_from_dict(data: Mapping[str, Any], source: str = "design") -> Design:
+    """Make the design that a design file's content describes.
+
+    Raises InputError when the class is unknown or a field is missing, unknown or unusable.
+    """
+    class_name = data.get("class") if isinstance(data, Mapping) else None
+    if class_name not in _REGISTRY:
+        _load_folder()
+    if class_name not in _REGISTRY:
+        known = ", ".join(sorted(_REGISTRY))
+        raise InputError(f"unknown structure class (known: {known})", source=source, field="class", value=class_name)
+    return _REGISTRY[class_name](data, source)
+
+
+def _load_folder() -> None:
+    """Import every module of this folder, so that a class is added by adding its file."""
+    import importlib
+    import pkgutil
+
+    package = importlib.import_module(__package__)
+    for module in pkgutil.iter_modules(package.__path__):
+        importlib.import_module(f"{__package__}.{module.name}")
