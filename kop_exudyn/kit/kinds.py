@@ -1,0 +1,156 @@
+"""Kinds of parts, and how a part realises an element.
+
+A kind is one module in this folder that registers a `PartKind`; nothing else has to change. All that the clustering,
+the assignment and the projection need is linear: an element of parameters q that part p realises in variant v should
+be q = V_v p with entries 0, 1 and -1 in V_v. Kinds that realise an interval instead of a value add a reach W_v >= 0:
+then every q in [V_v p, (V_v + W_v) p] is realised, and the distance is that to this box.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Callable, Mapping
+
+import numpy as np
+
+from ..errors import InputError
+
+Bounds = Mapping[str, tuple]  # kind -> (lower, upper), each a number or an array (k_p,)
+
+
+@dataclass(frozen=True)
+class Variants:
+    """The ways in which one part can be built in as an element of k_e parameters.
+
+    names : n_v names
+    matrices : (n_v, k_e, k_p) V, entries 0, 1 or -1
+    reach : (n_v, k_e, k_p) W >= 0, or None where a part realises exactly one element in each variant
+    """
+
+    names: tuple[str, ...]
+    matrices: np.ndarray
+    reach: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "matrices", np.asarray(self.matrices, dtype=float))
+        if self.reach is not None:
+            object.__setattr__(self, "reach", np.asarray(self.reach, dtype=float))
+        products = np.einsum("vek,vel->vkl", self.matrices, self.matrices)
+        if not np.array_equal(products, products * np.eye(products.shape[1])):
+            raise ValueError("the parts' least-squares problem must be diagonal: one part parameter an element's")
+
+    def residuals(self, elements: np.ndarray, parts: np.ndarray) -> np.ndarray:
+        """(n, m, n_v, k_e): elements (n, k_e) minus the nearest that each of the parts (m, k_p) realises."""
+        nearest = np.einsum("vek,mk->mve", self.matrices, parts)
+        difference = elements[:, None, None, :] - nearest
+        if self.reach is None:
+            return difference
+        width = np.einsum("vek,mk->mve", self.reach, parts)
+        return difference - np.clip(difference, 0, width)
+
+    def contact(self, elements: np.ndarray, variant: np.ndarray, parts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The linear maps that the elements (n, k_e) are compared with, in variant (n,) of the parts (n, k_p).
+
+        Returns A (n, k_e, k_p) and active (n, k_e): the residual is q - A p where active, else zero.
+        """
+        rows = self.matrices[variant]
+        if self.reach is None:
+            return rows, np.ones(elements.shape, dtype=bool)
+        reach = self.reach[variant]
+        difference = elements - np.einsum("nek,nk->ne", rows, parts)
+        width = np.einsum("nek,nk->ne", reach, parts)
+        beyond = difference > width
+        return rows + np.where(beyond[:, :, None], reach, 0.0), beyond | (difference < 0)
+
+    def lift(self, elements: np.ndarray, near: np.ndarray | None = None) -> np.ndarray:
+        """(n, k_p) parts that realise the elements (n, k_e) exactly as they are (in the first variant).
+
+        What an element leaves open (the other side of an end element's part) is taken from the parts `near` (n, k_p),
+        without them from the element's other variants.
+        """
+        first = np.linalg.pinv(self.matrices[0])
+        if near is None:
+            near = elements @ np.linalg.pinv(self.matrices.mean(axis=0)).T
+        return near + (elements - near @ self.matrices[0].T) @ first.T
+
+
+@dataclass(frozen=True)
+class PartKind:
+    """One kind of parts.
+
+    name : as in `ElementGroup.kind`
+    parameter_names : names of the k_p part parameters
+    variants : k_e -> Variants, for each number of parameters that elements of this kind may have
+    canonical : parts (m, k_p) -> the same parts in their standard form
+    lower, upper : (k_p,) natural bounds
+    angular : whether the parameters are angles (scale 1) or lengths (scale: the inputs' median)
+    penalty : (k_p,) weights of 1/2 (p / scale)^2, averaged over the kind's parts, in the projection energy
+    """
+
+    name: str
+    parameter_names: tuple[str, ...]
+    variants: Mapping[int, Variants]
+    canonical: Callable[[np.ndarray], np.ndarray]
+    lower: np.ndarray
+    upper: np.ndarray
+    angular: bool = False
+    penalty: np.ndarray | None = None
+
+    @property
+    def n_parameters(self) -> int:
+        return len(self.parameter_names)
+
+    def variants_of(self, n_parameters: int) -> Variants:
+        """Variants for elements of that many parameters; InputError where this kind has no such elements."""
+        if n_parameters not in self.variants:
+            known = ", ".join(map(str, sorted(self.variants)))
+            raise InputError(f"{self.name} elements have {known} parameters", field="elements", value=n_parameters)
+        return self.variants[n_parameters]
+
+    def scale(self, values: np.ndarray) -> float:
+        """The length that makes this kind's distances dimensionless: median of the input elements' parameters."""
+        return 1.0 if self.angular else float(np.median(np.abs(values)))
+
+    def bounds(self, bounds: Bounds | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """(k_p,), (k_p,): the natural bounds, narrowed by the user's; InputError when nothing lies between them."""
+        lower, upper = np.array(self.lower, dtype=float), np.array(self.upper, dtype=float)
+        if bounds and self.name in bounds:
+            lower = np.maximum(lower, np.broadcast_to(bounds[self.name][0], lower.shape))
+            upper = np.minimum(upper, np.broadcast_to(bounds[self.name][1], upper.shape))
+        if not np.all(lower <= upper):
+            raise InputError("no part lies within these bounds", field=f"bounds.{self.name}",
+                             value=(lower.tolist(), upper.tolist()))
+        return lower, upper
+
+
+_REGISTRY: dict[str, PartKind] = {}
+
+
+def register(kind: PartKind) -> PartKind:
+    """Make a kind known under its name."""
+    _REGISTRY[kind.name] = kind
+    return kind
+
+
+def kind_names() -> list[str]:
+    """Names of all kinds, sorted."""
+    _load_folder()
+    return sorted(_REGISTRY)
+
+
+def part_kind(name: str) -> PartKind:
+    """The kind of that name; InputError when there is none."""
+    if name not in _REGISTRY:
+        _load_folder()
+    if name not in _REGISTRY:
+        raise InputError(f"unknown kind of parts (known: {', '.join(sorted(_REGISTRY))})", field="parts", value=name)
+    return _REGISTRY[name]
+
+
+def _load_folder() -> None:
+    """Import every module of this folder, so that a kind is added by adding its file."""
+    import importlib
+    import pkgutil
+
+    package = importlib.import_module(__package__)
+    for module in pkgutil.iter_modules(package.__path__):
+        importlib.import_module(f"{__package__}.{module.name}")
