@@ -38,7 +38,8 @@ def brute_force(groups, q, m):
     return best
 
 
-@pytest.mark.parametrize("n_full, n_end, m, seed", [(4, 0, 2, 0), (3, 1, 2, 1), (2, 3, 2, 2), (0, 4, 1, 3), (5, 1, 1, 4)])
+@pytest.mark.parametrize("n_full, n_end, m, seed",
+                         [(4, 0, 2, 0), (3, 1, 2, 1), (2, 3, 2, 2), (0, 4, 1, 3), (5, 1, 1, 4)])
 def test_tiny_problems_reach_the_optimum(n_full, n_end, m, seed):
     groups, q = linear_problem(n_full, n_end, seed)
     groups = [group for group in groups if len(group.indices)]
