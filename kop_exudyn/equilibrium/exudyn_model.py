@@ -28,9 +28,9 @@ try:
 except ImportError as error:
     raise ImportError("kop_exudyn needs exudyn >= 1.13.6 (pip install 'exudyn>=1.13.6')") from error
 
-if tuple(int(part) for part in exu.GetVersionString().split(".")[:3]) < _TESTED:
+if tuple(int(part) for part in exu.__version__.split(".")[:3]) < _TESTED:
     raise ImportError(
-        f"kop_exudyn needs exudyn >= 1.13.6, found {exu.GetVersionString()}: older releases take the rod's stress-free "
+        f"kop_exudyn needs exudyn >= 1.13.6, found {exu.__version__}: older releases take the rod's stress-free "
         "state from other data than the reference coordinates, and would give wrong equilibria")
 
 # Round-off of Exudyn's residual relative to EA: below it, a re-solve of a solution could not converge.
@@ -116,7 +116,7 @@ class ExudynModel:
             raise SimulationFailure(f"Exudyn's static solver moved the state by {moved:.2e} of the size")
         force = np.abs(equilibrium.stress) / np.array([1, 1, 1] + 3 * [scene.length_scale])
         return Confirmation(
-            exu.GetVersionString(), int(solver.it.newtonSteps), float(solver.conv.residual / max(force.max(), self._tiny)),
+            exu.__version__, int(solver.it.newtonSteps), float(solver.conv.residual / max(force.max(), self._tiny)),
             float(moved), perf_counter() - begin, state)
 
     # -- model -----------------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ returned.
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
@@ -97,6 +97,12 @@ class Equilibrium:
     def start(self) -> Start:
         """This equilibrium as the start of another solve."""
         return Start(self.state, self.torque, self.stress)
+
+    def after(self, *earlier: Equilibrium) -> Equilibrium:
+        """The same equilibrium, with the iterations and seconds of the solves that led to it added."""
+        return replace(self, iterations=self.iterations + sum(eq.iterations for eq in earlier),
+                       escapes=self.escapes + sum(eq.escapes for eq in earlier),
+                       wall_s=self.wall_s + sum(eq.wall_s for eq in earlier))
 
 
 def solve(

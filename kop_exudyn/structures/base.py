@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ..equilibrium.newton import Equilibrium
     from ..equilibrium.system import System
     from ..scene.scene import Scene
+    from ..scene.state import State
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,7 @@ class Design(ABC):
     def deploy(self, q: np.ndarray | None = None) -> dict[str, Equilibrium]:
         """Equilibria of all roles from the design's own starting geometry (no warm start), at q (default: the input).
 
+        Their `iterations` and `wall_s` count all solves that led to them (see `Equilibrium.after`).
         Raises SimulationFailure when one of them can't be reached.
         """
 
@@ -101,6 +103,10 @@ class Design(ABC):
     @abstractmethod
     def target(self) -> Target:
         """The target; may need simulations of the input design, so it is computed at first use and kept."""
+
+    def report_positions(self, state: State) -> np.ndarray:
+        """Joint positions (n, 3) in the order and the units of the design's own file."""
+        return state.positions[self.joints]
 
     @property
     def fitted_role(self) -> Role:
@@ -112,6 +118,10 @@ class Design(ABC):
         from ..equilibrium.system import System
 
         return {role.name: System(self.scene(role.name)) for role in self.roles}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What travels to another process: everything but the solver workspaces, which are made anew there."""
+        return {key: value for key, value in self.__dict__.items() if key != "systems"}
 
     @property
     def n_elements(self) -> int:

@@ -1,0 +1,79 @@
+"""One design simulated: its final state, confirmed by Exudyn, and how well it fits its target."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from ..equilibrium.exudyn_model import Confirmation, ExudynModel
+from ..equilibrium.newton import Equilibrium
+from ..equilibrium.warm_up import warm_up
+from ..errors import SimulationFailure
+from ..optimize.fitting import FitResult, TargetFitting
+from ..structures.base import Design
+
+
+@dataclass(frozen=True)
+class SimulationResult:
+    """The final state of one design.
+
+    unknowns, elements : of the final state's scene
+    newton_iterations, wall_s : of all solves from the input to that state, seconds without compilation
+    equilibria, confirmations : by role; the states are Exudyn's
+    fit : of the deployed joints to the target
+    joints : (n, 3) positions
+    """
+
+    design: Design
+    unknowns: int
+    elements: int
+    newton_iterations: int
+    wall_s: float
+    equilibria: dict[str, Equilibrium]
+    confirmations: dict[str, Confirmation]
+    fit: FitResult
+    joints: np.ndarray
+
+    @property
+    def deployed(self) -> Equilibrium:
+        """The equilibrium that the design is made for."""
+        return self.equilibria[self.design.fitted_role.name]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As `kop simulate --json` prints it."""
+        final = self.deployed
+        return {
+            "design": self.design.name, "unknowns": self.unknowns, "elements": self.elements,
+            "newton_iterations": self.newton_iterations, "wall_s": self.wall_s,
+            "elastic_energy": final.elastic_energy, "stable": final.stable, "opening_angle": final.opening,
+            "exudyn": self.confirmations[self.design.fitted_role.name].to_dict(),
+            "fit": {"max_percent": self.fit.max_percent, "mean_percent": self.fit.mean_percent},
+            "joints": self.joints.tolist(),
+        }
+
+
+def simulate(design: Design) -> SimulationResult:
+    """Deploy a design and have Exudyn confirm its states.
+
+    Raises SimulationFailure when a state isn't found, is unstable, or isn't confirmed.
+    """
+    warm_up()
+    begin = perf_counter()
+    try:
+        equilibria = dict(design.deploy())
+        wall_s = perf_counter() - begin
+        target = design.target
+        confirmations = {}
+        for name, equilibrium in equilibria.items():
+            confirmations[name] = ExudynModel(design.scene(name)).confirm(equilibrium)
+    except SimulationFailure as failure:
+        raise failure.within(design.name) from None
+    role = design.fitted_role.name
+    joints = design.report_positions(confirmations[role].state)
+    fit = TargetFitting(target)(confirmations[role].state.positions[design.joints])
+    system = design.systems[role]
+    return SimulationResult(
+        design, system.n_unknowns, len(system.scene.elements), sum(eq.iterations for eq in equilibria.values()), wall_s,
+        equilibria, confirmations, fit, joints)

@@ -1,0 +1,74 @@
+"""The whole job: from input designs to one kit, all baselines and both stages."""
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Callable, Mapping, Sequence
+
+from ..kit.parts import Kit
+from ..structures.base import Design
+from .dataset import Dataset
+from .objective import Reference, Weights
+from .pool import DesignPool
+from .stages import Observer, StageResult, Stages, StageSettings, Store
+
+
+@dataclass(frozen=True)
+class JobSettings:
+    """What a run is made with.
+
+    weights : of the objective's terms; design_weights : how much each design counts (default: all the same)
+    stages : settings of the stages
+    jobs : processes
+    baselines : also compute the unrelaxed baseline
+    """
+
+    weights: Weights = Weights()
+    design_weights: tuple[float, ...] | None = None
+    stages: StageSettings = StageSettings()
+    jobs: int = 2
+    baselines: bool = True
+
+
+@dataclass
+class JobOutcome:
+    """What `run_job` found: the references of all designs, the stages by name, and the cost."""
+
+    references: list[Reference]
+    stages: dict[str, StageResult] = field(default_factory=dict)
+    equilibria: int = 0
+    newton_iterations: int = 0
+
+
+def run_job(
+    designs: Sequence[Design], parts: Mapping[str, int], settings: JobSettings = JobSettings(),
+    store: Store | None = None, observer: Observer | None = None,
+    announce: Callable[[str], None] = lambda phase: None, kit: Kit | None = None,
+) -> JobOutcome:
+    """Find a kit of that many parts a kind for all designs; or, given a kit, project the designs onto it.
+
+    store : keeps checkpoints, from which an interrupted run goes on
+    observer : sees every accepted step; announce : is told the phases' names
+
+    Raises InputError for impossible requests, SimulationFailure when an input design can't be simulated.
+    """
+    with DesignPool(designs, settings.jobs) as pool:
+        announce("input designs")
+        pool.prepare()
+        dataset = Dataset.of_pool(pool, settings.weights, settings.design_weights)
+        stages = Stages(dataset, parts, settings.stages, store, observer)
+        outcome = JobOutcome(pool.references)
+        found = outcome.stages
+        announce("direct projection")
+        found["direct"] = stages.direct(kit)
+        if settings.baselines and kit is None:
+            announce("unrelaxed baseline")
+            found["unrelaxed"] = stages.assigned(found["direct"], "unrelaxed")
+        announce("relaxed stage")
+        relaxed = stages.relaxed(found["direct"].kit, fixed_kit=kit is not None)
+        announce("path to the parts")
+        found["relaxed"], at_parts = stages.to_parts(relaxed, fixed_kit=kit is not None)
+        announce("assigned stage")
+        found["assigned"] = at_parts if kit is not None else stages.assigned(at_parts)
+        found["assigned"].jumps = at_parts.jumps
+        outcome.equilibria, outcome.newton_iterations = dataset.tally.equilibria, dataset.tally.newton_iterations
+    return outcome

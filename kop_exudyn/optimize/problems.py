@@ -1,0 +1,135 @@
+"""The two optimisation problems: over all elements, drawn to the kit (relaxed), and over the kit alone (assigned)."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..kit.kinds import Bounds
+from ..kit.parts import Assignment, Kit
+from ..kit.projection import Projection
+from .constraints import LinearConstraints
+from .dataset import Dataset
+from .objective import Evaluation
+from .problem import Derivatives, LiftedTerm, Point
+
+
+@dataclass
+class DatasetPoint:
+    """What the problems keep with a point.
+
+    evaluations : of all designs; replaced by Exudyn's once the point is accepted
+    kit, assignment : nearest to the point (relaxed), or that the point is made of (assigned)
+    terms : the objective's terms by name, summed over designs
+    """
+
+    evaluations: list[Evaluation]
+    kit: Kit
+    assignment: Assignment
+    terms: dict[str, float]
+
+
+class RelaxedProblem:
+    """J(q) = sum F(q) + P(q) over the parameters q of all elements; the kit follows q.
+
+    fixed_kit : keep the kit (projection onto an existing one), only the assignment follows
+    """
+
+    def __init__(self, dataset: Dataset, projection: Projection, kit: Kit, bounds: Bounds | None = None,
+                 constraints: LinearConstraints | None = None, fixed_kit: bool = False):
+        self.dataset, self.projection, self.kit, self.fixed_kit = dataset, projection, kit, fixed_kit
+        self.lower, self.upper = dataset.bounds(bounds)
+        self.n = len(self.lower)
+        self.constraints = constraints if constraints is not None else LinearConstraints.none(self.n)
+        self.scale = dataset.scales()
+        self.block_sizes = tuple(np.diff(dataset.offsets).tolist())
+
+    def evaluate(self, x: np.ndarray, previous: Point | None) -> Point:
+        before: DatasetPoint | None = previous.data if previous is not None else None
+        evaluations = self.dataset.evaluate(x, before.evaluations if before else None)
+        return self.point(x, evaluations, before.kit if before else self.kit)
+
+    def point(self, x: np.ndarray, evaluations: list[Evaluation], kit: Kit) -> Point:
+        """The point of given evaluations, its kit found from a nearby one."""
+        nearest = self.projection.minimise(x, kit, self.fixed_kit)
+        terms = _sum_terms(self.dataset, evaluations) | {"projection": nearest.energy}
+        value = self.dataset.value(evaluations) + nearest.energy
+        return Point(x, value, DatasetPoint(evaluations, nearest.kit, nearest.assignment, terms))
+
+    def derivatives(self, point: Point) -> Derivatives:
+        data: DatasetPoint = point.data
+        designs = self.dataset.derivatives(data.evaluations, hessian=True)
+        data.evaluations = [d.evaluation for d in designs]
+        weights = self.dataset.design_weights
+        gradient = np.concatenate([w * d.gradient for w, d in zip(weights, designs)])
+        gradient += self.projection.gradient(point.x, data.kit, data.assignment)
+        hessian = sp.block_diag([w * d.hessian for w, d in zip(weights, designs)], format="csc")
+        quadratic = self.projection.hessian(point.x, data.kit, data.assignment)
+        if self.fixed_kit:
+            return Derivatives(gradient, sp.csc_matrix(hessian + sp.csc_matrix(quadratic.qq)))
+        used = np.flatnonzero(quadratic.pp.diagonal() > 0)  # a side that no element uses has no say
+        extra = LiftedTerm(sp.csc_matrix(quadratic.qq), sp.csc_matrix(sp.csc_matrix(quadratic.qp)[:, used]),
+                           sp.csc_matrix(sp.csc_matrix(quadratic.pp)[used][:, used]))
+        return Derivatives(gradient, hessian, extra)
+
+
+class AssignedProblem:
+    """J(p) = sum F(M p) over the parts p, every element being its part; the assignment is fixed."""
+
+    def __init__(self, dataset: Dataset, kit: Kit, assignment: Assignment, bounds: Bounds | None = None,
+                 constraints: LinearConstraints | None = None):
+        self.dataset, self.kit, self.assignment = dataset, kit, assignment
+        self.matrix = sp.csr_matrix(assignment.matrix(kit))
+        self.lower, self.upper = kit.bounds(bounds)
+        self._limit_by_designs()
+        self.n = len(self.lower)
+        self.constraints = constraints if constraints is not None else LinearConstraints.none(self.n)
+        self.scale = self._scale()
+
+    def evaluate(self, x: np.ndarray, previous: Point | None) -> Point:
+        before: DatasetPoint | None = previous.data if previous is not None else None
+        return self.point(x, self.dataset.evaluate(self.matrix @ x, before.evaluations if before else None))
+
+    def point(self, x: np.ndarray, evaluations: list[Evaluation]) -> Point:
+        """The point of given evaluations."""
+        data = DatasetPoint(evaluations, self.kit.with_vector(x), self.assignment, _sum_terms(self.dataset, evaluations))
+        return Point(x, self.dataset.value(evaluations), data)
+
+    def derivatives(self, point: Point) -> Derivatives:
+        data: DatasetPoint = point.data
+        designs = self.dataset.derivatives(data.evaluations, hessian=True)
+        data.evaluations = [d.evaluation for d in designs]
+        gradient, hessian = np.zeros(self.n), np.zeros((self.n, self.n))
+        for weight, d, start, end in zip(self.dataset.design_weights, designs, self.dataset.offsets,
+                                         self.dataset.offsets[1:]):
+            rows = self.matrix[start:end]
+            gradient += weight * (rows.T @ d.gradient)
+            hessian += weight * (rows.T @ (rows.T @ d.hessian.T).T)
+        unused = np.flatnonzero(np.abs(hessian).sum(axis=1) == 0)
+        hessian[unused, unused] = np.abs(hessian.diagonal()).mean()  # parts that nothing uses stay where they are
+        return Derivatives(gradient, sp.csc_matrix(hessian))
+
+    def _limit_by_designs(self) -> None:
+        """An element's own bounds are its part's: entries of M are +-1, one a row."""
+        lower, upper = self.dataset.bounds(None)
+        rows = self.matrix.tocoo()
+        for row, part, sign in zip(rows.row, rows.col, rows.data):
+            low, high = (lower[row], upper[row]) if sign > 0 else (-upper[row], -lower[row])
+            self.lower[part] = max(self.lower[part], low)
+            self.upper[part] = min(self.upper[part], high)
+
+    def _scale(self) -> np.ndarray:
+        """A part's scale is that of the elements it serves."""
+        scale = np.zeros(self.n)
+        rows = self.matrix.tocoo()
+        np.maximum.at(scale, rows.col, self.dataset.scales()[rows.row])
+        return np.where(scale > 0, scale, 1.0)
+
+
+def _sum_terms(dataset: Dataset, evaluations: list[Evaluation]) -> dict[str, float]:
+    total: dict[str, float] = {}
+    for weight, evaluation in zip(dataset.design_weights, evaluations):
+        for name, value in evaluation.terms.items():
+            total[name] = total.get(name, 0.0) + float(weight * value)
+    return total

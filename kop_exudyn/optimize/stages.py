@@ -1,0 +1,296 @@
+"""The stages of finding a kit: direct, unrelaxed, relaxed, the watched path to the parts, and assigned."""
+from __future__ import annotations
+
+import json
+import logging
+from dataclasses import dataclass, field, replace
+from typing import Any, Callable, Mapping, Protocol, Sequence
+
+import numpy as np
+
+from ..errors import SimulationFailure
+from ..kit.cluster import cluster
+from ..kit.kinds import Bounds
+from ..kit.parts import Assignment, Kit
+from ..kit.projection import Projection
+from .dataset import Dataset, evaluations_from_arrays, evaluations_to_arrays
+from .history import SQPState, StepRecord
+from .objective import Evaluation
+from .problem import Point
+from .problems import AssignedProblem, RelaxedProblem
+from .sqp import SQPOptions, SQPResult, minimise
+
+log = logging.getLogger(__name__)
+
+# A joint that moves this much further in one step of the path than in the steps around it has snapped.
+_JUMP_FACTOR = 6.0
+_JUMP_SHARE = 0.01  # of the bounding box; smaller moves are no snap whatever their ratio
+
+
+class Store(Protocol):
+    """Where checkpoints go: named sets of plain arrays."""
+
+    def load(self, name: str) -> Mapping[str, np.ndarray] | None: ...
+
+    def save(self, name: str, arrays: Mapping[str, np.ndarray]) -> None: ...
+
+
+class NoStore:
+    """Keeps nothing."""
+
+    def load(self, name: str) -> None:
+        return None
+
+    def save(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
+        pass
+
+
+@dataclass(frozen=True)
+class StageSettings:
+    """Settings of the stages.
+
+    schedule : values of w_c, one after the other
+    tight : largest rms distance of elements to their parts, relative to the kind's scale, at which raising w_c ends
+    relaxed_steps, assigned_steps : accepted SQP steps at most, for each w_c and for the assigned stage
+    relaxed_tolerance, assigned_tolerance : a stage ends when a full step promises less than this share of J
+    path_steps : steps of the watched path between the stages
+    rescues : how often w_c is raised by ten when a design snaps on that path
+    growth : how many parts a kind may then get more, when raising w_c didn't help
+    restarts, seed : of the clustering
+    bounds : kind -> (lower, upper) of the parts, besides the natural ones
+    hessian : "exact" or "bfgs"
+    """
+
+    schedule: tuple[float, ...] = (1e3, 1e4, 1e5, 1e6)
+    tight: float = 1e-3
+    relaxed_steps: int = 25
+    assigned_steps: int = 40
+    relaxed_tolerance: float = 1e-3
+    assigned_tolerance: float = 1e-4
+    path_steps: int = 10
+    rescues: int = 2
+    growth: int = 0
+    restarts: int = 20
+    seed: int = 0
+    bounds: Bounds | None = None
+    hessian: str = "exact"
+
+
+@dataclass(frozen=True)
+class StageEvent:
+    """One accepted step, as observers see it: the stage's name, the record, the objective's terms, w_c (or None)."""
+
+    stage: str
+    record: StepRecord
+    terms: Mapping[str, float]
+    weight: float | None
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A snap on the path to the parts: which design, at which fraction of the way, how far (share of the box)."""
+
+    design: str
+    fraction: float
+    distance: float
+
+
+@dataclass
+class StageResult:
+    """What a stage left: by design an evaluation confirmed by Exudyn, or the failure that it met.
+
+    kit, assignment : those that the stage ended with
+    steps : accepted steps; value : objective (None where a design failed); status : of the last SQP
+    """
+
+    designs: list[Evaluation | SimulationFailure]
+    kit: Kit
+    assignment: Assignment
+    steps: int = 0
+    value: float | None = None
+    status: str = ""
+    jumps: list[Jump] = field(default_factory=list)
+
+
+Observer = Callable[[StageEvent], None]
+
+
+class Stages:
+    """Runs the stages for one dataset; interrupted SQPs go on from the store's checkpoints."""
+
+    def __init__(self, dataset: Dataset, parts: Mapping[str, int], settings: StageSettings = StageSettings(),
+                 store: Store | None = None, observer: Observer | None = None):
+        self.dataset, self.parts, self.settings = dataset, dict(parts), settings
+        self.store, self.observer = store or NoStore(), observer or (lambda event: None)
+        self.q0 = dataset.parameters
+        self.projection = Projection.of_inputs(dataset.groups, self.q0, bounds=settings.bounds)
+
+    def direct(self, kit: Kit | None = None) -> StageResult:
+        """Cluster the inputs (or take a kit), replace every element by its part."""
+        clustering = None
+        if kit is None:
+            clustering = cluster(self.dataset.groups, self.q0, self.parts, bounds=self.settings.bounds,
+                                 restarts=self.settings.restarts, seed=self.settings.seed)
+            kit = clustering.kit
+        nearest = self.projection.minimise(self.q0, kit, fixed_kit=True)
+        assignment = clustering.assignment if clustering is not None else nearest.assignment
+        designs, jumps = self._to_parts(self.inputs(), kit, assignment)
+        return self._result(designs, kit, assignment, jumps=jumps)
+
+    def inputs(self) -> list[Evaluation]:
+        """The input designs, judged by the objective."""
+        calls = {n: (d.parameters, dict(r.equilibria))
+                 for n, (d, r) in enumerate(zip(self.dataset.designs, self.dataset.references))}
+        return list(self.dataset.judge(calls).values())
+
+    def relaxed(self, kit: Kit, start: Sequence[Evaluation] | None = None, fixed_kit: bool = False,
+                name: str = "relaxed") -> StageResult:
+        """Minimise over all elements, w_c raised until the clusters are tight; from the inputs or given evaluations."""
+        settings, evaluations = self.settings, list(start or self.inputs())
+        steps, q, result = 0, np.concatenate([e.q for e in evaluations]), None
+        for weight in settings.schedule:
+            result, problem = self._relax(f"{name}-{weight:g}", weight, q, evaluations, kit, fixed_kit)
+            q, evaluations, kit = result.x, result.point.data.evaluations, result.point.data.kit
+            steps += result.steps
+            if max(problem.projection.tightness(q, kit, result.point.data.assignment).values()) <= settings.tight:
+                break
+        data = result.point.data
+        return StageResult(list(evaluations), kit, data.assignment, steps, result.point.value, result.status)
+
+    def assigned(self, start: StageResult, name: str = "assigned") -> StageResult:
+        """Minimise over the parts from a state in which every element is its part; designs that failed stay out."""
+        members = [n for n, e in enumerate(start.designs) if isinstance(e, Evaluation)]
+        if not members:
+            return replace(start, status="no design could be built from the kit", jumps=[])
+        dataset = self.dataset.subset(members)
+        assignment = restrict(start.assignment, self.dataset, members)
+        problem = AssignedProblem(dataset, start.kit, assignment, self.settings.bounds)
+        point = problem.point(start.kit.vector.copy(), [start.designs[n] for n in members])
+        options = SQPOptions(hessian=self.settings.hessian, max_steps=self.settings.assigned_steps,
+                             decrease_tolerance=self.settings.assigned_tolerance)
+        result = self._sqp(name, problem, point, options, None)
+        designs = list(start.designs)
+        for n, evaluation in zip(members, result.point.data.evaluations):
+            designs[n] = evaluation
+        return self._result(designs, result.point.data.kit, start.assignment, result.steps, result.status)
+
+    def to_parts(self, relaxed: StageResult, fixed_kit: bool = False) -> tuple[StageResult, StageResult]:
+        """Follow the straight path from the relaxed elements to their parts, watching for snaps.
+
+        When a design snaps or fails, w_c is raised and the relaxed stage goes on from where it was. Returns the
+        relaxed result that the path started from in the end, and the state at the parts.
+        """
+        settings = self.settings
+        weight = settings.schedule[-1]
+        for rescue in range(settings.rescues + 1):
+            designs, jumps = self._to_parts(relaxed.designs, relaxed.kit, relaxed.assignment)
+            failed = [d for d in designs if isinstance(d, SimulationFailure)]
+            for jump in jumps:
+                log.warning("%s snaps at %.0f %% of the way to its parts (%.1f %% of its size)", jump.design,
+                            100 * jump.fraction, 100 * jump.distance)
+            for failure in failed:
+                log.warning("%s", failure)
+            if not jumps and not failed or rescue == settings.rescues:
+                break
+            weight *= 10
+            log.warning("raising w_c to %g", weight)
+            before = relaxed
+            q = np.concatenate([e.q for e in before.designs])
+            result, _ = self._relax(f"rescue-{rescue + 1}", weight, q, before.designs, before.kit, fixed_kit)
+            data = result.point.data
+            relaxed = StageResult(list(data.evaluations), data.kit, data.assignment, before.steps + result.steps,
+                                  result.point.value, result.status, before.jumps + jumps)
+        return relaxed, self._result(designs, relaxed.kit, relaxed.assignment, jumps=jumps)
+
+    # -- pieces ----------------------------------------------------------------------------------------------------
+    def _relax(self, name: str, weight: float, q: np.ndarray, evaluations: Sequence[Evaluation], kit: Kit,
+               fixed_kit: bool) -> tuple[SQPResult, RelaxedProblem]:
+        settings = self.settings
+        problem = RelaxedProblem(self.dataset, self.projection.with_weight(weight), kit, settings.bounds,
+                                 fixed_kit=fixed_kit)
+        options = SQPOptions(hessian=settings.hessian, max_steps=settings.relaxed_steps,
+                             decrease_tolerance=settings.relaxed_tolerance)
+        return self._sqp(name, problem, problem.point(q, list(evaluations), kit), options, weight), problem
+
+    def _sqp(self, name: str, problem: Any, start: Point, options: SQPOptions, weight: float | None) -> SQPResult:
+        """Minimise, or go on from the store's checkpoint of that name."""
+        tally = problem.dataset.tally
+        before = (tally.equilibria, tally.newton_iterations)
+        state, saved = None, self.store.load(name)
+        terms: list[str] = []
+        if saved is not None:
+            state = SQPState.from_arrays({k[4:]: v for k, v in saved.items() if k.startswith("sqp/")})
+            evaluations = evaluations_from_arrays(
+                problem.dataset, {k[7:]: v for k, v in saved.items() if k.startswith("states/")})
+            start = (problem.point(state.x, evaluations, problem.kit.with_vector(saved["kit"]))
+                     if isinstance(problem, RelaxedProblem) else problem.point(state.x, evaluations))
+            tally.equilibria += int(saved["tally"][0])
+            tally.newton_iterations += int(saved["tally"][1])
+            terms = [str(row) for row in saved["terms"]]
+            for record, row in zip(state.history, terms):
+                self.observer(StageEvent(name, record, json.loads(row), weight))
+
+        def checkpoint(state: SQPState, point: Point) -> None:
+            terms.append(json.dumps(point.data.terms))
+            self.observer(StageEvent(name, state.history[-1], point.data.terms, weight))
+            self.store.save(name, {
+                **{f"sqp/{k}": v for k, v in state.to_arrays().items()},
+                **{f"states/{k}": v for k, v in evaluations_to_arrays(point.data.evaluations).items()},
+                "kit": point.data.kit.vector, "terms": np.array(terms),
+                "tally": np.array([tally.equilibria - before[0], tally.newton_iterations - before[1]]),
+            })
+
+        result = minimise(problem, start.x, options, checkpoint=checkpoint, state=state, start=start)
+        log.info("%s: %d steps, J = %.6g, %s", name, result.steps, result.point.value, result.status)
+        return result
+
+    def _to_parts(self, start: Sequence[Evaluation], kit: Kit, assignment: Assignment
+                  ) -> tuple[list[Evaluation | SimulationFailure], list[Jump]]:
+        """Follow all designs to their parts; one that fails on the way is deployed there from scratch instead."""
+        q = assignment.matrix(kit) @ kit.vector
+        outcomes = self.dataset.follow(q, start, self.settings.path_steps)
+        designs: list[Evaluation | SimulationFailure] = []
+        jumps = []
+        for n, path in enumerate(outcomes):
+            if isinstance(path, SimulationFailure):
+                designs.append(path)
+                continue
+            jump = find_jump(self.dataset.designs[n], start[n], path, self.dataset.references[n].target.diagonal)
+            jumps += [jump] if jump is not None else []
+            designs.append(path[-1])
+        failed = [n for n, d in enumerate(designs) if isinstance(d, SimulationFailure)]
+        for n, evaluation in self.dataset.redeploy(q, failed).items():
+            if isinstance(evaluation, Evaluation):
+                designs[n] = evaluation
+        return designs, jumps
+
+    def _result(self, designs: list[Evaluation | SimulationFailure], kit: Kit, assignment: Assignment, steps: int = 0,
+                status: str = "", jumps: Sequence[Jump] = ()) -> StageResult:
+        """Confirm what was kept, and sum the objective up where no design failed."""
+        found = {n: d for n, d in enumerate(designs) if isinstance(d, Evaluation)}
+        for n, confirmed in self.dataset.confirm(found).items():
+            designs[n] = confirmed
+        complete = all(isinstance(d, Evaluation) for d in designs)
+        return StageResult(designs, kit, assignment, steps, self.dataset.value(designs) if complete else None, status,
+                           list(jumps))
+
+
+def find_jump(design: Any, start: Evaluation, path: Sequence[Evaluation], diagonal: float) -> Jump | None:
+    """The largest snap on a path of equal parameter steps, or None: joints that move far more in one step."""
+    role = design.fitted_role.name
+    positions = [e.equilibria[role].state.positions[design.joints] for e in (start, *path)]
+    moves = np.array([np.linalg.norm(b - a, axis=1).max() for a, b in zip(positions, positions[1:])]) / diagonal
+    worst = int(np.argmax(moves))
+    if moves[worst] > _JUMP_SHARE and moves[worst] > _JUMP_FACTOR * np.median(moves):
+        return Jump(design.name, (worst + 1) / len(path), float(moves[worst]))
+    return None
+
+
+def restrict(assignment: Assignment, dataset: Dataset, members: Sequence[int]) -> Assignment:
+    """The assignment of some designs of a dataset, in the numbering of their subset."""
+    subset = dataset.subset(members)
+    counts = [len(d.groups) for d in dataset.designs]
+    first = np.cumsum([0, *counts])
+    rows = [k for n in members for k in range(first[n], first[n + 1])]
+    return Assignment(tuple(subset.groups), tuple(assignment.part[k] for k in rows),
+                      tuple(assignment.variant[k] for k in rows), int(subset.offsets[-1]))
