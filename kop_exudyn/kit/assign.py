@@ -40,8 +40,7 @@ def assign_with_stock(groups: Sequence[ElementGroup], q: np.ndarray, kit: Kit,
 def to_assignment(groups: Sequence[ElementGroup], n_q: int, elements: Mapping[str, KindElements],
                   labels: Mapping[str, Labels]) -> Assignment:
     """Labels by kind, sorted back into the groups."""
-    part: list = [None] * len(groups)
-    variant: list = [None] * len(groups)
+    part, variant = ([np.empty(0, dtype=np.intp)] * len(groups) for _ in range(2))
     for name, e in elements.items():
         start = 0
         for number in (number for block in e.groups for number in block):

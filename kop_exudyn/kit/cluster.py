@@ -43,6 +43,8 @@ def cluster(groups: Sequence[ElementGroup], q: np.ndarray, parts: Mapping[str, i
     """
     elements = collect(groups, q, penalties=penalties)
     _check_request(elements, parts)
+    for name in bounds or ():
+        part_kind(name)  # a misspelt kind would leave its parts unbounded
     found, labels, energy = {}, {}, {}
     for name, e in elements.items():
         limits = e.kind.bounds(bounds)

@@ -118,7 +118,7 @@ def _nearest_in_block(block: Block, parts: np.ndarray) -> tuple[np.ndarray, np.n
 
 def collect(groups: Sequence[ElementGroup], q: np.ndarray, scales: Mapping[str, float] | None = None,
             penalties: Penalties | None = None) -> dict[str, KindElements]:
-    """The elements by kind (alphabetical), from the groups and all parameters q (n_q,).
+    """The elements by kind (alphabetical), from the groups and all parameters q (n_q,); empty groups are left out.
 
     scales : kind -> scale; by default those of q itself
     Raises InputError for unknown kinds, values that aren't finite and inputs without any extent.
@@ -126,6 +126,8 @@ def collect(groups: Sequence[ElementGroup], q: np.ndarray, scales: Mapping[str, 
     q = np.asarray(q, dtype=float)
     by_kind: dict[str, dict[int, list[int]]] = {}
     for number, group in enumerate(groups):
+        if len(group.indices) == 0:
+            continue
         if not np.isfinite(q[group.indices]).all():
             raise InputError("element parameters must be finite numbers", field=group.kind)
         by_kind.setdefault(group.kind, {}).setdefault(group.indices.shape[1], []).append(number)

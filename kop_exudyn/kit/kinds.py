@@ -114,8 +114,12 @@ class PartKind:
         """(k_p,), (k_p,): the natural bounds, narrowed by the user's; InputError when nothing lies between them."""
         lower, upper = np.array(self.lower, dtype=float), np.array(self.upper, dtype=float)
         if bounds and self.name in bounds:
-            lower = np.maximum(lower, np.broadcast_to(bounds[self.name][0], lower.shape))
-            upper = np.minimum(upper, np.broadcast_to(bounds[self.name][1], upper.shape))
+            try:
+                least, most = (np.broadcast_to(np.asarray(b, dtype=float), lower.shape) for b in bounds[self.name])
+            except (TypeError, ValueError):
+                raise InputError(f"expected a lower and an upper bound, numbers or {len(lower)} of them each",
+                                 field=f"bounds.{self.name}", value=bounds[self.name]) from None
+            lower, upper = np.maximum(lower, least), np.minimum(upper, most)
         if not np.all(lower <= upper):
             raise InputError("no part lies within these bounds", field=f"bounds.{self.name}",
                              value=(lower.tolist(), upper.tolist()))

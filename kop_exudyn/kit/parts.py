@@ -79,9 +79,12 @@ class Kit:
 def _checked(kind: PartKind, values: Any) -> np.ndarray:
     """(m, k_p) read-only copy of a kind's parts."""
     try:
-        parts = np.array(values, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError("parts are lists of numbers", field=f"kit.{kind.name}", value=values) from None
+        given = np.array(values)
+    except ValueError:  # lists of different lengths
+        given = np.array(None)
+    if given.dtype.kind not in "iuf":
+        raise InputError("parts are lists of numbers, equally many each", field=f"kit.{kind.name}", value=values)
+    parts = given.astype(float)
     if parts.ndim == 1 and kind.n_parameters == 1:
         parts = parts[:, None]
     if parts.ndim != 2 or len(parts) == 0 or parts.shape[1] != kind.n_parameters:
@@ -117,7 +120,7 @@ class Assignment:
 
         With kinds that realise intervals, M p is their lower end, and `upper` asks for the upper one.
         """
-        return self._rows(kit, [_end(v, variant, upper) for v, variant in self._variants()])
+        return self._rows(kit, [_end(variants, variant, upper) for _, _, variants, variant in self._filled()])
 
     def contact(self, q: np.ndarray, kit: Kit) -> tuple[sp.csr_array, np.ndarray]:
         """M (n_q, n_p) and active (n_q,) bool: the elements q differ by q - M p where active, elsewhere not at all.
@@ -126,7 +129,7 @@ class Assignment:
         """
         active = np.zeros(self.n_q, dtype=bool)
         blocks = []
-        for group, part, (variants, variant) in zip(self.groups, self.part, self._variants()):
+        for group, part, variants, variant in self._filled():
             rows, touching = variants.contact(q[group.indices], variant, kit[group.kind][part])
             active[group.indices] = touching
             blocks.append(rows)
@@ -145,7 +148,7 @@ class Assignment:
     def pieces(self, kit: Kit) -> dict[str, np.ndarray]:
         """kind -> (m,) how many elements each part realises."""
         counts = {name: np.zeros(m, dtype=int) for name, m in kit.sizes.items()}
-        for group, part in zip(self.groups, self.part):
+        for group, part, _, _ in self._filled():
             counts[group.kind] += np.bincount(part, minlength=len(counts[group.kind]))
         return counts
 
@@ -169,19 +172,21 @@ class Assignment:
         if kinds != [group.kind for group in groups] or lengths != (sizes, sizes):
             raise InputError("doesn't fit the elements of these designs", source=source)
         assignment = cls(tuple(groups), part, variant, n_q)
-        for group, parts, (variants, chosen) in zip(groups, part, assignment._variants()):
+        for group, parts, variants, chosen in assignment._filled():
             if not (_within(parts, len(kit[group.kind])) and _within(chosen, len(variants.names))):
                 raise InputError("names a part or variant that doesn't exist", source=source, field=group.kind)
         return assignment
 
-    def _variants(self) -> Iterator[tuple[Variants, np.ndarray]]:
-        for group, variant in zip(self.groups, self.variant):
-            yield part_kind(group.kind).variants_of(group.indices.shape[1]), variant
+    def _filled(self) -> Iterator[tuple[ElementGroup, np.ndarray, Variants, np.ndarray]]:
+        """Each group that has elements: the group, its parts, what its variants mean, its variants."""
+        for group, part, variant in zip(self.groups, self.part, self.variant):
+            if len(part):
+                yield group, part, part_kind(group.kind).variants_of(group.indices.shape[1]), variant
 
     def _rows(self, kit: Kit, blocks: Sequence[np.ndarray]) -> sp.csr_array:
-        """CSR (n_q, n_p) of each group's maps (n, k_e, k_p) from its parts to its elements."""
+        """CSR (n_q, n_p) of each filled group's maps (n, k_e, k_p) from its parts to its elements."""
         rows, columns, values = [], [], []
-        for group, part, block in zip(self.groups, self.part, blocks):
+        for (group, part, _, _), block in zip(self._filled(), blocks):
             k_p = block.shape[2]
             first = kit.offsets[group.kind] + k_p * part
             rows.append(np.broadcast_to(group.indices[:, :, None], block.shape).ravel())

@@ -119,24 +119,28 @@ class Projection:
         """kind -> root mean square distance of the elements to their parts, relative to the kind's scale."""
         _, difference, _ = self._difference(q, kit, assignment)
         squares = dict.fromkeys(self.scales, 0.0)
-        for group in self.groups:
+        for group in self._filled:
             squares[group.kind] += float(np.sum(difference[group.indices] ** 2))
         counts = self._counts()
         return {name: float(np.sqrt(total / counts[name])) / self.scales[name] for name, total in squares.items()}
+
+    @property
+    def _filled(self) -> list[ElementGroup]:
+        return [group for group in self.groups if len(group.indices)]
 
     def _elements(self, q: np.ndarray) -> dict[str, KindElements]:
         return collect(self.groups, q, self.scales, self.penalties)
 
     def _counts(self) -> dict[str, int]:
         counts = dict.fromkeys(self.scales, 0)
-        for group in self.groups:
+        for group in self._filled:
             counts[group.kind] += len(group.indices)
         return counts
 
     def _weights(self, n_q: int) -> np.ndarray:
         """(n_q,) w_c / (n_kind scale^2) of each element parameter, zero outside the groups."""
         weights, counts = np.zeros(n_q), self._counts()
-        for group in self.groups:
+        for group in self._filled:
             weights[group.indices] = self.weight / (counts[group.kind] * self.scales[group.kind] ** 2)
         return weights
 

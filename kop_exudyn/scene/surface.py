@@ -68,7 +68,7 @@ class TriangleSurface:
         self.faces = _faces(faces, len(self.vertices))
         self.normals = _unit_normals(self.vertices, self.faces)
 
-    @property
+    @cached_property
     def diagonal(self) -> float:
         """Length of the bounding box's diagonal."""
         used = self.vertices[np.unique(self.faces)]

@@ -111,6 +111,8 @@ def test_bounds_are_honoured():
     found = cluster(groups, q, {"linear": 4}, bounds={"linear": (1.8, [2.0, 2.6])})
     parts = found.kit["linear"]
     assert parts.min() >= 1.8 and parts[:, 1].max() <= 2.6 and parts[:, 0].max() <= 2.0
+    with pytest.raises(InputError, match="unknown kind"):
+        cluster(groups, q, {"linear": 4}, bounds={"lineal": (1, 2)})
 
 
 def test_result_is_canonical_sorted_and_nearest():

@@ -71,6 +71,11 @@ def test_bounds_are_narrowed_and_must_leave_something():
     assert (lower[0], upper[0]) == (0, 0.5)
     with pytest.raises(InputError, match="no part lies"):
         part_kind("linear").bounds({"linear": (3, 2)})
+    for unusable in ((0, [1, 2, 3]), (0, "a"), (1,), (0, 1, 2)):
+        with pytest.raises(InputError, match="a lower and an upper"):
+            part_kind("linear").bounds({"linear": unusable})
+    with pytest.raises(InputError, match="no part lies"):
+        part_kind("linear").bounds({"linear": (np.nan, 2)})
 
 
 def test_bad_kinds():

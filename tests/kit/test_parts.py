@@ -38,6 +38,8 @@ def test_kit_survives_json():
     ({"linear": [[1, 2, 3]]}, "2 parameters"),
     ({"linear": []}, "at least one part"),
     ({"linear": [["a", 2]]}, "lists of numbers"),
+    ({"linear": [["1", "2"]]}, "lists of numbers"),
+    ({"linear": None}, "lists of numbers"),
     ({"linear": [[1, float("nan")]]}, r"linear\[0\].*outside"),
     ({"linear": [[1, 2], [-1, 2]]}, r"linear\[1\].*outside"),
     ({"angular": [4.0]}, "outside"),

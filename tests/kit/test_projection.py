@@ -125,3 +125,17 @@ def test_user_bounds_hold_the_parts():
     projection = Projection.of_inputs(groups(), Q, bounds={"linear": (1.5, 2.5)})
     best = projection.minimise(Q, cluster(groups(), Q, {"linear": 5, "angular": 2}).kit)
     assert best.kit["linear"].min() >= 1.5 and best.kit["linear"].max() <= 2.5
+
+
+def test_empty_groups_are_harmless():
+    none = np.empty((0, 2), dtype=int)
+    empty = [ElementGroup("linear", none), *groups(), ElementGroup("cell", none)]
+    sizes = {"linear": 3, "angular": 2}
+    found, without = cluster(empty, Q, sizes), cluster(groups(), Q, sizes)
+    best = Projection.of_inputs(empty, Q).minimise(Q, found.kit)
+    assert best.energy == Projection.of_inputs(groups(), Q).minimise(Q, without.kit).energy
+    assert [len(part) for part in best.assignment.part] == [0, 15, 10, 15, 0]
+    np.testing.assert_array_equal(best.assignment.matrix(best.kit).toarray(),
+                                  without.assignment.matrix(without.kit).toarray())
+    projection = Projection.of_inputs(empty, Q)
+    assert set(projection.tightness(Q, best.kit, best.assignment)) == {"linear", "angular"}
