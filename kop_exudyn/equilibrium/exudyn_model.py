@@ -33,8 +33,8 @@ if tuple(int(part) for part in exu.__version__.split(".")[:3]) < _TESTED:
         f"kop_exudyn needs exudyn >= 1.13.6, found {exu.__version__}: older releases take the rod's stress-free "
         "state from other data than the reference coordinates, and would give wrong equilibria")
 
-# Round-off of Exudyn's residual relative to EA: below it, a re-solve of a solution could not converge.
-_ABSOLUTE_TOLERANCE = 1e-13
+# Multiple of the round-off in the rods' forces, eps size EA / L: below it, a re-solve of a solution could not converge.
+_ROUND_OFF = 200.0
 # Relative to the first residual, which is that of all reactions missing (Exudyn's static Newton starts its multipliers
 # at zero). Its joints leave their geometric stiffness out of the Jacobian, so that close to a bifurcation the residual
 # stalls near 1e-7 of the forces; elsewhere the first step reaches 1e-10.
@@ -233,9 +233,9 @@ class ExudynModel:
         static.adaptiveStep = False
         static.newton.maxIterations = _MAX_STEPS
         static.newton.relativeTolerance = _RELATIVE_TOLERANCE
-        stiffness = self.scene.stiffness[:, 0].max()
-        static.newton.absoluteTolerance = _ABSOLUTE_TOLERANCE * stiffness
-        self._tiny = float(np.finfo(float).eps * stiffness)
+        scene = self.scene
+        self._tiny = float(np.finfo(float).eps * scene.size * scene.stiffness[:, 0].max() / scene.length_scale)
+        static.newton.absoluteTolerance = _ROUND_OFF * self._tiny
         settings.solution.file.write = False
         settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
         settings.linearSolver.reuseAnalyzedPattern = True

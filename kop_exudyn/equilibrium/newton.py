@@ -162,7 +162,8 @@ class _Run:
             if is_convex(negative, border):
                 break
             self._leave_saddle(energy)
-            converged = self._descend(self.options.max_iterations)
+            # on the second saddle in a row the quick iteration leads back: descend all the way
+            converged = self._mixed() if self.options.mixed and self.escapes == 1 else self._descend(60)
         self.system.factorised_at = self.state
         return Equilibrium(
             state=self.state, q=np.array(self.q, float), opening=self.opening,
@@ -247,21 +248,39 @@ class _Run:
         self.escapes += 1
         if self.escapes > self.options.escapes:
             raise SimulationFailure(f"still unstable after leaving {self.escapes - 1} saddles")
-        mode = softest_mode(self.system).vector
+        softest = softest_mode(self.system)
+        mode = softest.vector
         side = self.options.side
         if side is not None and side @ mode < 0 or side is None and mode[np.argmax(np.abs(mode))] < 0:
             mode = -mode
         mode = mode * (self.options.escape_rotation / np.abs(mode[self.system.is_rotation]).max())
-        trials = []
-        for scale in (1.0, -1.0, 0.1, -0.1):
-            state = self.state.moved(self.system.increment(scale * mode))
-            drop = self.system.assemble(state, ENERGY).potential - energy.potential
-            trials.append((drop, state))
+        ahead, gain = self._lowest_along(mode, energy.potential)
+        if gain >= 0.0 or side is None:
             # the preferred side is taken unless the other one is clearly lower
-            if len(trials) == 2 and min(t[0] for t in trials) < 0:
+            back, other = self._lowest_along(-mode, energy.potential)
+            ahead, gain = (back, other) if other < 1.1 * gain or gain >= 0.0 else (ahead, gain)
+        if gain >= 0.0:
+            raise SimulationFailure("a neutral equilibrium (a mechanism, or a bifurcation point): no lower energy along "
+                                    f"its softest mode, of eigenvalue {softest.eigenvalue:.2g}")
+        self.state = ahead
+        system = self.system
+        system.assemble(ahead)
+        system.predicted_stress[:] = system.stress()
+        log.debug("left a saddle: energy change %.3g", gain)
+
+    def _lowest_along(self, mode: np.ndarray, potential: float) -> tuple[State, float]:
+        """The lowest state on a ray of doubling steps, and its potential's change (not negative: none was lower)."""
+        best, change, scale = self.state, 0.0, 1.0
+        for _ in range(8):
+            state = self.state.moved(self.system.increment(scale * mode))
+            drop = self.system.assemble(state, ENERGY).potential - potential
+            if drop < change:
+                best, change, scale = state, drop, 2 * scale
+            elif change < 0.0:
                 break
-        drop, self.state = trials[0] if trials[0][0] < 0.9 * min(t[0] for t in trials) else min(trials, key=lambda t: t[0])
-        log.debug("left a saddle: energy change %.3g", drop)
+            else:
+                scale /= 8
+        return best, change
 
     # -- measures --------------------------------------------------------------------------------------------------
     def _residual(self) -> tuple[np.ndarray, float]:

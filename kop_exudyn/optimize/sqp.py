@@ -30,7 +30,9 @@ class SQPOptions:
     max_trials : points evaluated in search of one step
     gradient_tolerance : stop when the projected gradient, in scaled variables, falls below this share of the larger
         of the objective and the projected gradient at the start
-    decrease_tolerance : stop when the full, undamped model step promises less than this share of the objective
+    decrease_tolerance : stop when the full, undamped model step promises less than this share of the objective, or
+        when the last `stall_steps` steps together gained less than it
+    stall_steps : see there
     radius : first trust radius in scaled variables (2-norm); infinite: the first step is the model's minimiser
     min_radius : smallest trust radius; below it no step is looked for
     accept : least share of the predicted reduction that a step must attain
@@ -43,6 +45,7 @@ class SQPOptions:
     max_trials: int = 25
     gradient_tolerance: float = 1e-6
     decrease_tolerance: float = 1e-10
+    stall_steps: int = 3
     radius: float = np.inf
     min_radius: float = 1e-10
     accept: float = 1e-4
@@ -130,6 +133,9 @@ class _Run:
             norm, state = self._stationarity(point, derivatives, state)
             if norm <= self.options.gradient_tolerance * max(state.gradient_scale, abs(point.value)):
                 return self._result(state, point, True, "converged: the projected gradient met its tolerance")
+            if self._stalled(state, point):
+                text = f"converged: the last {self.options.stall_steps} steps gained less than the tolerance"
+                return self._result(state, point, True, text)
             if state.step >= self.options.max_steps:
                 text = f"stopped after {state.step} steps: raise max_steps or resume from the last state"
                 return self._result(state, point, False, text)
@@ -142,6 +148,11 @@ class _Run:
                 self.observer(state.history[-1])
             if self.checkpoint is not None:
                 self.checkpoint(state, point)
+
+    def _stalled(self, state: SQPState, point: Point) -> bool:
+        recent = state.history[-self.options.stall_steps:]
+        return (len(recent) == self.options.stall_steps
+                and sum(r.actual for r in recent) <= self.options.decrease_tolerance * abs(point.value))
 
     def _begin(self, x0, state: SQPState | None, start: Point | None) -> tuple[SQPState, Point]:
         """The first state and point; the quasi-Newton matrix of a resumed run."""
