@@ -53,7 +53,10 @@ class Factorisation:
 
 @nb.njit(cache=True)
 def _solve_blocks(indptr, indices, data, inverse_pivots, order, rhs, out):
-    """Forward, diagonal and backward substitution for blocks of columns at once (A = P L D L^T P^T)."""
+    """Forward, diagonal and backward substitution for blocks of columns at once (A = P L D L^T P^T).
+
+    Right-hand sides of sensitivities are sparse, so the forward pass skips rows that are still zero.
+    """
     n, total = rhs.shape
     work = np.empty((n, _BLOCK))
     for start in range(0, total, _BLOCK):
@@ -62,6 +65,11 @@ def _solve_blocks(indptr, indices, data, inverse_pivots, order, rhs, out):
             for c in range(_BLOCK):
                 work[i, c] = rhs[order[i], start + c] if c < k else 0.0
         for j in range(n):
+            filled = False
+            for c in range(_BLOCK):
+                filled |= work[j, c] != 0.0
+            if not filled:
+                continue
             for t in range(indptr[j], indptr[j + 1]):
                 i, v = indices[t], data[t]
                 for c in range(_BLOCK):

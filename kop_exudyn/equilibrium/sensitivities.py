@@ -51,16 +51,25 @@ class Sensitivities:
     @cached_property
     def full(self) -> np.ndarray:
         """x_q (n_free, n_parameters): all free unknowns in all parameters; angles in rad, translations global."""
-        x_q, torque_q = bordered_solve(self.system, self._border, -self._residual_q[: self._n].toarray())
-        self._torque_q = np.asarray(torque_q)
-        return x_q
+        return self._rows_of_full(slice(None))
+
+    @cached_property
+    def _unconstrained(self) -> np.ndarray:
+        """-K^-1 R_q (n_free, n_parameters), before the actuation's equation is put in."""
+        return self.system.solve(-self._residual_q[: self._n].toarray(order="C"))
+
+    def _rows_of_full(self, rows: np.ndarray | slice) -> np.ndarray:
+        """Rows of x_q; the border's rank-one part is added to these rows only, the whole is seldom needed."""
+        if self._border is None:
+            return self._unconstrained[rows]
+        return self._unconstrained[rows] - np.outer(self._border.column[rows], self.torque_gradient)
 
     def rows(self, dofs: np.ndarray) -> np.ndarray:
         """Derivatives (m, n_parameters) of any unknowns of the scene, pinned (zero) and driven ones included."""
         kept = self.system.sparsity.kept[dofs]
         out = np.zeros((len(kept), self.system.scene.n_parameters))
         free = (kept >= 0) & (kept < self._n)
-        out[free] = self.full[kept[free]]
+        out[free] = self._rows_of_full(kept[free])
         driven = kept >= self._n
         out[driven] = self._driven_map[kept[driven] - self._n].toarray()
         return out
@@ -75,9 +84,11 @@ class Sensitivities:
 
     @cached_property
     def torque_gradient(self) -> np.ndarray:
-        """Derivative (n_parameters,) of the actuation's multiplier."""
-        self.full
-        return np.broadcast_to(self._torque_q, (self.system.scene.n_parameters,)).copy()
+        """Derivative (n_parameters,) of the actuation's multiplier, zero without actuation."""
+        if self._border is None:
+            return np.zeros(self.system.scene.n_parameters)
+        actuated = np.flatnonzero(self.system.constraint)
+        return self.system.constraint[actuated] @ self._unconstrained[actuated] / self._border.schur
 
     @cached_property
     def opening_derivative(self) -> tuple[np.ndarray, float]:
@@ -126,7 +137,9 @@ class Sensitivities:
             block = upper + sp.triu(upper, 1).T
             lengths_driven = (driven.T @ self._length_residual[n:]).toarray()
             explicit += lengths_driven + lengths_driven.T + (driven.T @ block @ driven).toarray()
-        hessian = explicit + self._residual_q[:n].T @ self.full
+        hessian = explicit + self._residual_q[:n].T @ self._unconstrained
+        if self._border is not None:
+            hessian -= np.outer(self._residual_q[:n].T @ self._border.column, self.torque_gradient)
         return 0.5 * (hessian + hessian.T)
 
     @property
