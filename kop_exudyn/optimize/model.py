@@ -67,10 +67,10 @@ def build_model(x: np.ndarray, derivatives: Derivatives, hessian: sp.csc_matrix,
     scaled = sp.csc_matrix(0.5 * (scaled + scaled.T))
     extra = derivatives.extra
     whole = lift(scaled, extra, region.scale)
-    convexified = factorise_positive(whole) is None
+    k = whole.shape[0] - region.n
+    convexified = factorise_positive(whole, k) is None
     if convexified:
         whole = lift(convexify(scaled), extra, region.scale)
-    k = whole.shape[0] - region.n
     gradient = np.concatenate([region.scale * derivatives.gradient, np.zeros(k)])
     return QuadraticModel(region, _subproblem(x, whole, gradient, region), convexified)
 
@@ -83,7 +83,7 @@ def _subproblem(x: np.ndarray, H: sp.csc_matrix, g: np.ndarray, region: Region) 
     rows = region.constraints
     value = rows.A @ x
     A = sp.csr_matrix(sp.hstack([rows.A @ sp.diags(region.scale), sp.csr_matrix((rows.rows, k))]))
-    return QP(H, g, A, rows.lower - value, rows.upper - value, np.append(lb, -free), np.append(ub, free))
+    return QP(H, g, A, rows.lower - value, rows.upper - value, np.append(lb, -free), np.append(ub, free), k)
 
 
 def lift(hessian: sp.csc_matrix, extra: LiftedTerm | None, scale: np.ndarray) -> sp.csc_matrix:

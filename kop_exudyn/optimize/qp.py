@@ -18,6 +18,7 @@ class QP:
 
     H : (n, n) sparse, symmetric with both triangles, positive semidefinite
     g : (n,); A : (m, n) sparse; lo, hi : (m,); lb, ub : (n,), infinite where free
+    border : how many of the last unknowns couple otherwise uncoupled blocks of H; only speed depends on it
     """
 
     H: sp.csc_matrix
@@ -27,6 +28,7 @@ class QP:
     hi: np.ndarray
     lb: np.ndarray
     ub: np.ndarray
+    border: int = 0
 
 
 @dataclass(frozen=True)
@@ -113,8 +115,8 @@ class QPSolver:
 
     def _attempts(self, qp: ScaledQP, start) -> tuple[RawSolution, Residuals, str]:
         nothing = Residuals(np.nan, np.nan, np.nan)
-        inverse = factorise_positive(qp.H)
-        if inverse is None and is_indefinite(qp.H):  # OSQP would only print so, and only at set-up
+        inverse = factorise_positive(qp.H, qp.border)
+        if inverse is None and is_indefinite(qp.H, qp.border):  # OSQP would only print so, and only at set-up
             return RawSolution(*start, "indefinite", 0), nothing, "direct"
         direct = solve_direct(qp, inverse) if inverse is not None and self.options.direct else None
         attempts = [("direct", lambda: direct)] if direct is not None else []
@@ -198,7 +200,8 @@ class _Scaling:
         for matrix in (H, A):
             matrix.sort_indices()
         lo, hi = self.row * qp.lo / self.length, self.row * qp.hi / self.length
-        return ScaledQP(H, unit * qp.g / self.length**2, A, lo, hi, qp.lb / unit, qp.ub / unit)
+        return ScaledQP(H, unit * qp.g / self.length**2, A, lo, hi, qp.lb / unit, qp.ub / unit,
+                        qp.border)
 
     def into(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Variables and multipliers of the scaled QP."""
