@@ -1,0 +1,88 @@
+"""Design files: JSON in the format "kop_exudyn/design", one design a file, a dataset a folder of them."""
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Sequence
+
+from ..errors import InputError
+from ..structures.base import Design, design_from_dict
+from .documents import check_envelope, check_schema, has_schema
+from .json_files import read_json
+
+DESIGN_VERSION = 1
+_SUFFIXES = (".json", ".json.gz")
+
+
+def load_design(path: str | Path) -> Design:
+    """The design that a file describes.
+
+    Raises InputError naming the file, the field and the value when anything is wrong with it.
+    """
+    data = read_json(path)
+    check_envelope(data, "design", DESIGN_VERSION, source=path)
+    check_schema(data, "design", source=path)
+    if has_schema(data["class"]):
+        check_schema(data, data["class"], source=path)
+    try:
+        return design_from_dict(data, str(path))
+    except InputError as error:
+        raise error.at(path) from None
+
+
+def load_designs(folder: str | Path, select: int | Sequence[str] | None = None) -> list[Design]:
+    """The designs of a folder in the natural order of their file names (design_2 before design_10).
+
+    select : the first so many, or the names of files without their ending, in the order wanted; default: all
+
+    Raises InputError when there aren't that many, for unknown names, and when two designs have the same name.
+    """
+    designs = [load_design(path) for path in select_files(folder, select)]
+    seen: dict[str, Design] = {}
+    for design in designs:
+        if design.name in seen:
+            raise InputError("two designs have the same name", source=folder, field="name", value=design.name)
+        seen[design.name] = design
+    return designs
+
+
+def design_files(folder: str | Path) -> list[Path]:
+    """The design files of a folder, in natural order. Raises InputError when there is none."""
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError("is a file, expected a folder of designs" if folder.exists() else "no such folder",
+                         source=folder)
+    found = [path for path in folder.iterdir() if path.name.endswith(_SUFFIXES) and not path.name.startswith(".")]
+    if not found:
+        raise InputError("contains no designs (files that end in .json or .json.gz)", source=folder)
+    return sorted(found, key=_natural)
+
+
+def select_files(folder: str | Path, select: int | Sequence[str] | None = None) -> list[Path]:
+    """The files that `load_designs` reads, without reading them; raises its errors about the selection."""
+    paths = design_files(folder)
+    if select is None:
+        return paths
+    if isinstance(select, int):
+        if not 1 <= select <= len(paths):
+            raise InputError(f"expected a number of designs from 1 to {len(paths)}", source=folder, field="designs",
+                             value=select)
+        return paths[:select]
+    by_name = {_stem(path): path for path in paths}
+    for name in select:
+        if name not in by_name:
+            raise InputError(f"no such design (there are {', '.join(by_name)})", source=folder, field="designs",
+                             value=name)
+    if not select or len(set(select)) < len(select):
+        raise InputError("expected one or more different designs", source=folder, field="designs", value=list(select))
+    return [by_name[name] for name in select]
+
+
+def _stem(path: Path) -> str:
+    return path.name.removesuffix(".gz").removesuffix(".json")
+
+
+def _natural(path: Path) -> list[tuple[bool, int | str]]:
+    """Sort key under which the numbers in names count as numbers."""
+    return [(piece.isdigit(), int(piece) if piece.isdigit() else piece)
+            for piece in re.split(r"([0-9]+)", _stem(path)) if piece]

@@ -1,0 +1,24 @@
+"""Kit files: JSON in the format "kop_exudyn/kit", to project other designs onto a kit that exists."""
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..kit.parts import Kit
+from .documents import check_envelope, check_schema
+from .json_files import read_json, write_json
+
+KIT_VERSION = 1
+
+
+def load_kit(path: str | Path) -> Kit:
+    """The kit of a file; InputError when it is damaged or its parts can't be parts."""
+    data = read_json(path)
+    check_envelope(data, "kit", KIT_VERSION, source=path)
+    check_schema(data, "kit", source=path)
+    return Kit.from_dict(data["parts"], source=str(path))
+
+
+def save_kit(path: str | Path, kit: Kit, *, overwrite: bool = False) -> Path:
+    """Write a kit, exactly: `load_kit` gives the same numbers. InputError when the file exists or can't be written."""
+    data = {"format": "kop_exudyn/kit", "version": KIT_VERSION, "parts": kit.to_dict()}
+    return write_json(path, data, overwrite=overwrite)

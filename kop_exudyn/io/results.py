@@ -1,0 +1,56 @@
+"""Result files: what a kit optimisation found, as JSON that other programs read, and its states as arrays."""
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Mapping
+
+import numpy as np
+
+from ..errors import InputError
+from .arrays import load_arrays, save_arrays
+from .documents import check_envelope, check_schema
+from .json_files import plain, read_json, write_json
+
+RESULT_VERSION = 1
+
+
+def save_result(path: str | Path, result: Mapping[str, Any], *, overwrite: bool = False) -> Path:
+    """Write `KitResult.to_dict()` with the format's name and version in front.
+
+    Raises InputError when the file exists already or can't be written, ValueError when the content isn't a result.
+    """
+    data = {"format": "kop_exudyn/result", "version": RESULT_VERSION, **plain(result)}
+    try:
+        check_schema(data, "result")
+    except InputError as error:
+        raise ValueError(f"not a result: {error}") from None
+    return write_json(path, data, overwrite=overwrite)
+
+
+def load_result(path: str | Path) -> dict[str, Any]:
+    """The content of a result file; InputError when it is damaged or of another format."""
+    data = read_json(path)
+    check_envelope(data, "result", RESULT_VERSION, source=path)
+    check_schema(data, "result", source=path)
+    return data
+
+
+def save_states(path: str | Path, states: Mapping[tuple[str, str, str], Any], *, overwrite: bool = False) -> Path:
+    """Write final states as one .npz file: entries ``DESIGN/STAGE/ROLE/positions``, ``.../rotations``, ``.../angles``.
+
+    states : (design, stage, role) -> `State`
+    """
+    arrays = {"/".join([*key, field]): getattr(state, field)
+              for key, state in states.items() for field in ("positions", "rotations", "angles")}
+    return save_arrays(path, arrays, overwrite=overwrite)
+
+
+def load_states(path: str | Path) -> dict[tuple[str, str, str], dict[str, np.ndarray]]:
+    """What `save_states` wrote: (design, stage, role) -> {"positions", "rotations", "angles"}."""
+    found: dict[tuple[str, str, str], dict[str, np.ndarray]] = {}
+    for name, array in load_arrays(path).items():
+        *key, field = name.split("/")
+        if len(key) != 3:
+            raise InputError("not a file of final states", source=path, field=name)
+        found.setdefault(tuple(key), {})[field] = array
+    return found
