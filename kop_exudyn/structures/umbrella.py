@@ -1,0 +1,230 @@
+"""Umbrella meshes: cells of two plates and crossing arms, deployed from a flat stack by pulling the plates together."""
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Mapping, TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InputError, SimulationFailure
+from ..rods.sections import Material, material_from_dict
+from .base import Design, ElementGroup, Role, Target, register
+from .umbrella_layout import BaseMesh, Plates, umbrella_mesh
+from .umbrella_mesh import UmbrellaMesh, UmbrellaTarget
+from .umbrella_release import release_mesh
+
+if TYPE_CHECKING:
+    from ..equilibrium.newton import Equilibrium
+    from ..scene.attraction import Attraction
+    from ..scene.scene import Scene
+    from ..scene.state import State
+
+# Shortest arms of the published designs, as a multiple of the plate edge.
+_LEAST_LENGTH = 32 / 30
+_MIN_ELEMENTS, _MAX_ELEMENTS = 1, 20
+
+
+@dataclass(frozen=True)
+class Deployment:
+    """How an umbrella mesh is opened.
+
+    weights : of the actuators, one solve after the other
+    attraction : weight that pulls X joints and cell midpoints towards their places meanwhile; in the final state it is 0
+    share : of the attraction, omega; the rest would pull towards the surface and is left out, being 1e-5 of it
+    angle : rad, turn of all hinges in the compact state, so that it isn't the unstable equilibrium
+    tolerance : relative residual of all solves but the last
+    """
+
+    weights: tuple[float, ...] = (1e-3, 1e-2, 1e-1, 1.0)
+    attraction: float = 0.1
+    share: float = 0.99999
+    angle: float = 1e-3
+    tolerance: float = 1e-5
+
+
+class Umbrella(Design):
+    """An umbrella mesh. Its parameters are the arm lengths: top and bottom of every cell, one cell after the other.
+
+    Parameters
+    ----------
+    name : the design's name
+    mesh : geometry in the compact state
+    arms, plates : materials
+    arm_elements, plate_elements : rod elements in an arm and in a plate rod
+    least_length : lower bound of arm lengths, default 32/30 of the plate edge
+    deployment : how it is opened
+    """
+
+    class_name = "umbrella"
+    roles = (Role("deployed", fitted=True),)
+
+    def __init__(self, name: str, mesh: UmbrellaMesh, *, arms: Material = Material(1400.0, 0.35),
+                 plates: Material = Material(14000.0, 0.35), arm_elements: int = 3, plate_elements: int = 1,
+                 least_length: float | None = None, deployment: Deployment = Deployment()):
+        self.name, self.mesh, self.deployment = name, mesh, deployment
+        self.arms, self.plates = arms, plates
+        self.arm_elements, self.plate_elements = arm_elements, plate_elements
+        self.parameters = mesh.lengths.ravel()
+        least = _LEAST_LENGTH * mesh.plate_edge if least_length is None else least_length
+        self.lower = np.minimum(least, self.parameters)
+        self.upper = np.full(len(self.parameters), np.inf)
+        self.groups = [ElementGroup("cell", np.arange(2 * mesh.n_cells).reshape(-1, 2))]
+        self.joints = mesh.crossings
+
+    @classmethod
+    def from_release(cls, data: Mapping[str, Any], source: str = "umbrella mesh", **options: Any) -> Umbrella:
+        """The design of a released file's content; options as for the class. Raises InputError."""
+        return cls(options.pop("name", _stem(source)), release_mesh(data, source), **options)
+
+    @cached_property
+    def _model(self):
+        from .umbrella_scene import UmbrellaModel, umbrella_scene
+
+        return umbrella_scene(self.mesh, UmbrellaModel(self.arm_elements, self.plate_elements, self.arms, self.plates))
+
+    def scene(self, role: str = "deployed") -> Scene:
+        """The final state's scene: actuators of weight 1, no attraction, the central X joint pinned."""
+        return self._pinned
+
+    @cached_property
+    def _pinned(self) -> Scene:
+        scene = self._model.scene
+        pinned = np.zeros(scene.n_dofs, bool)
+        centre = self.joints[self.mesh.central_crossing]
+        pinned[6 * centre: 6 * centre + 6] = True
+        return scene.with_pins(pinned)
+
+    def deploy(self, q: np.ndarray | None = None) -> dict[str, Equilibrium]:
+        """Open the mesh from its compact state.
+
+        The actuators' weight grows in steps under the attraction; then the attraction is taken away and the central
+        X joint held where it is. Raises SimulationFailure.
+        """
+        from ..equilibrium.newton import NewtonOptions, solve
+        from ..equilibrium.system import System
+
+        q = self.parameters if q is None else np.asarray(q, float)
+        scene, attraction = self._model.scene if self.mesh.target else self._pinned, self.attractions()
+        options, done = NewtonOptions(tolerance=self.deployment.tolerance), []
+        start = self._model.compact(q, self.deployment.angle)
+        for weight in self.deployment.weights:
+            system = System(scene.with_terms(self._model.actuators.weighted(weight * self._model.energy_scale), *attraction))
+            start = self._solved(solve, system, q, start, options, f"actuator weight {weight:g}")
+            done.append(start)
+        final = self._solved(solve, self.systems["deployed"], q, start, NewtonOptions(), "final state")
+        return {"deployed": final.after(*done)}
+
+    def _solved(self, solve, system, q, start, options, where: str) -> Equilibrium:
+        try:
+            return solve(system, q, start, options=options)
+        except SimulationFailure as failure:
+            raise failure.within(f"{self.name}: {where}") from None
+
+    def attractions(self) -> tuple[Attraction, ...]:
+        """The attraction during deployment: X joints and cell midpoints to their places, as far as these are known.
+
+        Energy: weight share / (2 l0^2 3 n) sum |x - x*|^2 over n points, l0 the compact mesh's bounding-box diagonal.
+        """
+        from ..scene.attraction import Attraction
+
+        target = self.mesh.target
+        if target is None or not self.deployment.attraction:
+            return ()
+        known = np.isfinite(target.crossings).all(axis=1)
+        n = np.count_nonzero(known) + self.mesh.n_cells
+        weight = self.deployment.attraction * self.deployment.share / (3 * n)
+        weight *= self._model.energy_scale / self.mesh.size**2
+        return (Attraction(self.joints[known], targets=target.crossings[known], target_weight=weight),
+                Attraction(self.mesh.centres, targets=target.plates, target_weight=weight))
+
+    @cached_property
+    def deployed(self) -> Equilibrium:
+        """The input design's final state."""
+        return self.deploy()["deployed"]
+
+    @cached_property
+    def target(self) -> Target:
+        """The mesh's target surface, or, where it has none, the one through the deployed X joints and cell midpoints."""
+        state = self.deployed.state
+        positions = state.positions[self.joints]
+        if self.mesh.target is not None:
+            vertices, faces = self.mesh.target.vertices, self.mesh.target.faces
+        else:
+            vertices, faces = self._own_surface(state)
+        used = vertices[np.unique(faces)]
+        return Target(vertices, faces, positions, float(np.linalg.norm(np.ptp(used, axis=0))))
+
+    def _own_surface(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """Triangles between each cell's midpoint and its X joints, in pairs."""
+        mesh = self.mesh
+        place = np.full(len(mesh.positions), -1)
+        place[self.joints] = np.arange(len(self.joints))
+        arms = mesh.rods.arms
+        at = place[mesh.rods.joints[arms]].max(axis=1)
+        touching = np.unique(np.stack([mesh.rods.cells[arms], at], axis=1), axis=0)
+        faces = [(len(self.joints) + a[0], a[1], b[1]) for k, a in enumerate(touching)
+                 for b in touching[k + 1:] if a[0] == b[0]]
+        middles = state.positions[mesh.centres].mean(axis=1)
+        return np.concatenate([state.positions[self.joints], middles]), np.array(faces, int)
+
+    def report_positions(self, state: State) -> np.ndarray:
+        """Positions of all joints, plates' included, in the order and the units of the design's own file."""
+        return state.positions[: len(self.mesh.positions)]
+
+    def spacings(self, state: State) -> np.ndarray:
+        """Distance (n_cells,) of the two plates of every cell."""
+        return self._model.actuators.spacings(state)
+
+    def with_lengths(self, lengths: np.ndarray) -> Umbrella:
+        """The same design with other arm lengths (n_cells, 2) as its input."""
+        lengths = np.array(lengths, float).reshape(-1, 2)
+        positions = self.mesh.compact_positions(lengths.ravel())
+        return Umbrella(self.name, replace(self.mesh, lengths=lengths, positions=positions), arms=self.arms,
+                        plates=self.plates, arm_elements=self.arm_elements, plate_elements=self.plate_elements,
+                        least_length=float(self.lower.min()), deployment=self.deployment)
+
+
+@register("umbrella")
+def umbrella_from_dict(data: Mapping[str, Any], source: str = "design") -> Umbrella:
+    """The design of a file of class "umbrella" (see umbrella.schema.json); raises InputError naming the field."""
+    try:
+        base = BaseMesh(data["base"]["vertices"], data["base"]["faces"], bool(data["base"].get("flipped", False)))
+        plates = Plates(**data.get("plates", {}))
+        materials = {key: material_from_dict(value) for key, value in data.get("materials", {}).items()}
+        target = _target(data["target"], base) if "target" in data else None
+        return Umbrella(data["name"], umbrella_mesh(base, data["lengths"], plates, target), **materials,
+                        arm_elements=_count(data, "arm_elements", 3), plate_elements=_count(data, "plate_elements", 1),
+                        least_length=data.get("least_length"))
+    except KeyError as error:
+        raise InputError("a field is missing", source=source, field=str(error).strip("'")) from None
+    except (TypeError, AttributeError) as error:
+        raise InputError(f"wrong fields: {error}", source=source) from None
+    except InputError as error:
+        raise error.at(source) from None
+
+
+def _target(data: Mapping[str, Any], base: BaseMesh) -> UmbrellaTarget:
+    """The target of a design file; sizes are checked against the base mesh."""
+    n_cells, n_edges = len(base.faces), len(base.cells)
+    vertices, faces = np.array(data["vertices"], float), np.array(data["faces"], int)
+    crossings, plates = np.array(data["crossings"], float), np.array(data["plates"], float)
+    for field, array, shape in (("vertices", vertices, (len(vertices), 3)), ("faces", faces, (len(faces), 3)),
+                                ("crossings", crossings, (n_edges, 3)), ("plates", plates, (n_cells, 3))):
+        if array.shape != shape or not np.isfinite(array).all():
+            raise InputError(f"expected finite numbers of shape {shape}", field=f"target.{field}")
+    if faces.min(initial=0) < 0 or faces.max(initial=-1) >= len(vertices):
+        raise InputError(f"names a vertex that doesn't exist (there are {len(vertices)})", field="target.faces")
+    return UmbrellaTarget(vertices, faces, crossings, plates)
+
+
+def _count(data: Mapping[str, Any], field: str, default: int) -> int:
+    value = data.get(field, default)
+    if isinstance(value, bool) or not isinstance(value, int) or not _MIN_ELEMENTS <= value <= _MAX_ELEMENTS:
+        raise InputError(f"expected an integer from {_MIN_ELEMENTS} to {_MAX_ELEMENTS}", field=field, value=value)
+    return value
+
+
+def _stem(source: str) -> str:
+    name = str(source).replace("\\", "/").rsplit("/", 1)[-1]
+    return name.removesuffix(".gz").removesuffix(".json")
