@@ -1,0 +1,104 @@
+"""How the objective and its terms fell, step by step, in the SQP stages."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from .style import CYCLE, INK, QUIET, style
+
+_SHOWN = 1e-7  # of the largest value drawn; smaller ones would only stretch the axis
+
+
+@dataclass(frozen=True)
+class HistoryStep:
+    """The objective after one accepted step.
+
+    terms : its parts by name; their sum is the objective
+    weight : w_c of the projection energy at that step, None without one
+    """
+
+    terms: Mapping[str, float]
+    weight: float | None = None
+
+    @property
+    def value(self) -> float:
+        return sum(self.terms.values())
+
+
+@dataclass(frozen=True)
+class History:
+    """One stage's accepted steps in order."""
+
+    title: str
+    steps: Sequence[HistoryStep]
+
+
+def draw_history(histories: Sequence[History]) -> Figure:
+    """One panel a stage, logarithmic, on one scale; where w_c changes there is a line with its new value."""
+    names = list(dict.fromkeys(name for history in histories for step in history.steps for name in step.terms))
+    colours = {name: CYCLE[k % len(CYCLE)] for k, name in enumerate(names)}
+    widths = [max(len(history.steps), 1) for history in histories]
+    widths = [max(width, 0.45 * max(widths)) for width in widths]  # a short stage stays readable
+    with style():
+        figure = Figure(figsize=(9.5, 3.7), layout="constrained")
+        panels = figure.subplots(1, len(histories), sharey=True, width_ratios=widths, squeeze=False)[0]
+        for ax, history in zip(panels, histories):
+            _draw_stage(ax, history, colours)
+        panels[0].set_yscale("log")
+        panels[0].set_ylabel("objective and its terms")
+        _limit_below(panels[0], histories)
+        handles = {label: handle for ax in panels for handle, label in zip(*ax.get_legend_handles_labels())}
+        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=len(handles) or 1)
+    return figure
+
+
+def _draw_stage(ax: Axes, history: History, colours: Mapping[str, str]) -> None:
+    ax.set_title(history.title)
+    ax.set_xlabel("accepted steps")
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+    numbers = np.arange(1, len(history.steps) + 1)
+    if not len(numbers):
+        ax.text(0.5, 0.5, "no steps", transform=ax.transAxes, ha="center", color=QUIET)
+        return
+    marker = "o" if len(numbers) < 60 else None
+    for name, colour in colours.items():
+        values = [step.terms.get(name, np.nan) for step in history.steps]
+        if not np.isnan(values).all():
+            ax.plot(numbers, values, color=colour, label=name, marker=marker, markersize=2.5, linewidth=1.2)
+    ax.plot(numbers, [step.value for step in history.steps], color=INK, label="objective", linewidth=2.2)
+    _mark_weights(ax, history)
+    ax.margins(x=0.03)
+
+
+def _mark_weights(ax: Axes, history: History) -> None:
+    """A line between the steps where the weight changes, and every weight's value at the top of its stretch."""
+    first = 1
+    for weight, run in groupby(history.steps, key=lambda step: step.weight):
+        count = len(list(run))
+        if weight is not None:
+            if first > 1:
+                ax.axvline(first - 0.5, color=QUIET, linewidth=0.9, linestyle=(0, (4, 3)), zorder=0)
+            ax.text(first - 0.5 + 0.008 * len(history.steps), 0.985, f"$w_c$ = {_power(weight)}", color=QUIET, size=8,
+                    transform=ax.get_xaxis_transform(), va="top",
+                    rotation=90 if count < 0.12 * len(history.steps) else 0)
+        first += count
+
+
+def _limit_below(ax: Axes, histories: Sequence[History]) -> None:
+    values = np.array([value for history in histories for step in history.steps
+                       for value in (step.value, *step.terms.values())])
+    values = values[values > 0]
+    if len(values):
+        ax.set_ylim(bottom=max(values.min(), _SHOWN * values.max()) / 2, top=values.max() * 6)
+
+
+def _power(weight: float) -> str:
+    """10^3 for 1000, the plain number where it is no power of ten."""
+    exponent = np.log10(weight) if weight > 0 else np.nan
+    return f"$10^{{{round(exponent)}}}$" if abs(exponent - np.round(exponent)) < 1e-9 else f"{weight:g}"
