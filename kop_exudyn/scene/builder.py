@@ -75,13 +75,14 @@ class SceneBuilder:
 
     def rod(
         self, nodes: Sequence[int], stiffness: Any, *, length: Any = 0.0, parameter: int = -1, factor: float = 1.0,
-        curvature: Any = None, weight: Any = None, section: Section | None = None,
+        curvature: Any = None, rest_strain: Any = None, weight: Any = None, section: Section | None = None,
     ) -> np.ndarray:
         """Add a rod piece of k equal elements along its k + 1 nodes; returns the elements (k,).
 
         length : constant part of the whole piece's rest length; (k,) for unequal elements
         parameter, factor : rest length = length + factor q[parameter], shared equally by the elements
         curvature : (3,) or (k, 3) rest curvature (twist rate, about y, about z), 1 / length; default straight
+        rest_strain : (k, 6) the whole rest strain measure instead, as h / length of the unstressed relative motion h
         weight : (3,) dead load per rest length
         """
         nodes = np.asarray(nodes, int)
@@ -93,6 +94,8 @@ class SceneBuilder:
         rest[:, 0] = 1.0
         if curvature is not None:
             rest[:, 3:] = curvature
+        if rest_strain is not None:
+            rest[:] = rest_strain
         self._rods.append((
             np.stack([nodes[:-1], nodes[1:]], axis=1), np.array(np.broadcast_to(stiffness, (k, 6)), float), rest,
             np.array(length if length.ndim else np.full(k, length / k)), np.full(k, factor / k), np.full(k, parameter),
