@@ -32,10 +32,15 @@ def factorise_convex(system: System, shift: float = 0.0) -> tuple[float, Border 
         if is_convex(negative, border):
             return shift, border
         if base is None:
-            rotational = np.abs(system.values[system.sparsity.diagonal][system.is_rotation])
-            base = _SHIFT_START * float(np.median(rotational))
+            base = shift_unit(system)
         shift = max(_SHIFT_GROWTH * shift, base)
     raise FloatingPointError("no shift makes the stiffness positive definite")
+
+
+def shift_unit(system: System) -> float:
+    """The smallest shift that is worth trying."""
+    rotational = np.abs(system.values[system.sparsity.diagonal][system.is_rotation])
+    return _SHIFT_START * float(np.median(rotational))
 
 
 def border_of(system: System) -> Border | None:

@@ -3,8 +3,8 @@
 Plain Newton on slender rods crawls along the valley of the stretch-stiff energy. Here the geometric stiffness is taken
 at the stress that the last step predicted, sigma <- (K/L)(e + B d), while the gradient stays exact: the mixed-stress
 iteration of slender-shell continuation (Magisano, Leonetti, Garcea, CMAME 2017). Safeguards: a cap on rotations a
-step, a shift wherever a pivot is not positive, a fall-back to energy descent with line search when the residual
-stops falling. A converged state that the pivots show to be unstable is left along its softest mode: a saddle is never
+step, a shift wherever a pivot is not positive, a watchdog that returns to the best state when several steps bring
+nothing, and after that a fall-back to energy descent with line search. A converged state that the pivots show to be unstable is left along its softest mode: a saddle is never
 returned.
 """
 from __future__ import annotations
@@ -18,10 +18,14 @@ import numpy as np
 from ..errors import SimulationFailure
 from ..scene.assembly import ENERGY
 from ..scene.state import State
-from .direction import Border, border_of, bordered_solve, factorise_convex, is_convex
+from .direction import border_of, bordered_solve, factorise_convex, is_convex, shift_unit
 from .system import Energy, System
 
 log = logging.getLogger(__name__)
+
+_QUICK = 2  # headway within so many further steps: the steps may grow again
+_MAX_RETURNS = 8  # to the best state, before energy descent takes over
+_FLOOR_FACTOR = 30.0
 
 
 @dataclass(frozen=True)
@@ -32,7 +36,7 @@ class NewtonOptions:
     max_iterations : over all phases of one solve
     rotation_cap : rad, largest rotation or hinge turn of one step
     mixed : predicted-stress iteration; False gives plain Newton with line search
-    patience : mixed iterations without halving the residual before energy descent takes over
+    patience : mixed iterations without headway before the best state returns and steps become shorter
     escapes : how many saddles are left before the solve is given up
     escape_rotation : rad, largest rotation of the first move away from a saddle
     side : (n_free,) vector; where the two ways off a saddle are equivalent, the one with positive product is taken
@@ -42,7 +46,7 @@ class NewtonOptions:
     max_iterations: int = 300
     rotation_cap: float = 0.4
     mixed: bool = True
-    patience: int = 12
+    patience: int = 8
     escapes: int = 6
     escape_rotation: float = 0.05
     side: np.ndarray | None = None
@@ -133,6 +137,19 @@ def solve(
     return _Run(system, q, start, opening, options).solve()
 
 
+@dataclass
+class _Best:
+    """The best state of a mixed phase, with the stress of its geometric stiffness and what the next step promises."""
+
+    state: State
+    torque: float
+    stress: np.ndarray
+    value: float
+    merit: float
+    gap: float
+    slope: float = 0.0
+
+
 class _Run:
     """One solve: the iterate and the safeguards' memory."""
 
@@ -174,28 +191,56 @@ class _Run:
 
     # -- phases ----------------------------------------------------------------------------------------------------
     def _mixed(self) -> bool:
-        """Mixed-stress iterations until they converge or stop making headway; the best state is kept then."""
+        """Mixed-stress iterations until they converge or stop making headway; the best state is kept then.
+
+        Single steps may raise energy and residual: the stretch that they cause is undone by the next ones. So headway
+        is asked for only within `patience` steps (Grippo, Lampariello, Lucidi's watchdog). Without it the best state
+        returns, and the steps from there are shorter and, by a shift, stiffer in the soft directions.
+        """
         system, options = self.system, self.options
-        best, kept, since = np.inf, (self.state, self.torque), 0
+        best: _Best | None = None
+        cap, floor, since, returns = options.rotation_cap, 0.0, 0, 0
         while True:
             energy = system.assemble(self.state, mixed=True)
             residual, gap = self._residual()
             if self._converged(residual, gap):
                 return True
-            merit = self._merit(residual, gap)
-            since += 1
-            if merit < 0.5 * best:
-                best, kept, since = merit, (self.state, self.torque), 0
-            if not np.isfinite(energy.potential) or since > options.patience:
-                self.state, self.torque = kept
-                return False
+            merit, value = self._merit(residual, gap), energy.potential + self.torque * gap
+            if np.isfinite(value) and (best is None or self._headway(best, value, merit)):
+                if since <= _QUICK:
+                    cap, floor = min(options.rotation_cap, 2 * cap), floor / _FLOOR_FACTOR
+                best = _Best(self.state, self.torque, system.predicted_stress.copy(), value, merit, abs(gap))
+                since = 0
+            else:
+                since += 1
+                if best is None:
+                    return False
+                if since > options.patience or not np.isfinite(value):
+                    self.state, self.torque = best.state, best.torque
+                    system.predicted_stress[:] = best.stress
+                    returns, since = returns + 1, 0
+                    if returns > _MAX_RETURNS:
+                        return False
+                    cap, floor = cap / 3, max(_FLOOR_FACTOR * floor, 1e-3 * shift_unit(system))
+                    continue
             self._check_budget()
-            self.shift, border = factorise_convex(system, 0.0 if self.shift == 0 else self.shift / 16)
+            self.shift, border = factorise_convex(system, max(floor, self.shift / 16))
             step, change = bordered_solve(system, border, -residual, -gap)
-            scale = self._capped(step)
+            scale = self._capped(step, cap)
+            if since == 0:
+                best.slope = scale * float(residual @ step)
             system.predict_stress(scale * step)
             self.state = self.state.moved(system.increment(scale * step))
             self.torque += scale * change
+
+    def _headway(self, best: _Best, value: float, merit: float) -> bool:
+        """Whether a state is an advance on the best one: a lower energy, or half of its residual.
+
+        While the mean angle is still on its way to the opening energies can't be compared.
+        """
+        if merit < 0.5 * best.merit or best.gap > 1e-9:
+            return True
+        return self.system.conservative and value < best.value - 1e-3 * abs(best.slope)
 
     def _descend(self, limit: int) -> bool:
         """Newton on the energy with shift and Armijo line search; at most `limit` accepted steps."""
@@ -214,7 +259,7 @@ class _Run:
                 return True
             self._check_budget()
             step, _ = bordered_solve(system, border, -residual, -gap)
-            scale = self._line_search(step, self._capped(step), float(residual @ step), energy)
+            scale = self._line_search(step, self._capped(step, self.options.rotation_cap), float(residual @ step), energy)
             if scale == 0.0:
                 if shift == 0.0:
                     return self._merit(residual, gap) < 1.0
@@ -311,9 +356,10 @@ class _Run:
     def _converged(self, residual: np.ndarray, gap: float) -> bool:
         return self._merit(residual, gap) <= 1.0
 
-    def _capped(self, step: np.ndarray) -> float:
+    def _capped(self, step: np.ndarray, cap: float) -> float:
+        """Share of a step that turns nothing by more than a cap, rad."""
         turn = np.abs(step[self.system.is_rotation]).max(initial=0.0)
-        return min(1.0, self.options.rotation_cap / max(turn, np.finfo(float).tiny))
+        return min(1.0, cap / max(turn, np.finfo(float).tiny))
 
     def _close_gap(self) -> None:
         """Spread what the mean angle lacks over all actuated hinges: descent keeps the equation satisfied."""
