@@ -3,7 +3,7 @@
 The names below are loaded at first use, so that ``import kop_exudyn`` costs milliseconds:
 
 >>> import kop_exudyn as kop
->>> design = kop.load_design("models/conformals/conformal_01.json")  # doctest: +SKIP
+>>> design = kop.load_design("models/conformals/01_sinh.json")  # doctest: +SKIP
 >>> kop.simulate(design).fit.max_percent  # doctest: +SKIP
 """
 from __future__ import annotations
@@ -27,6 +27,7 @@ _PUBLIC = {
     "io.designs": ("load_design", "load_designs"),
     "io.kits": ("load_kit", "save_kit"),
     "io.results": ("load_result",),
+    "report.kit_run": ("optimize_kit",),
 }
 _MODULE_OF = {name: module for module, names in _PUBLIC.items() for name in names}
 

@@ -62,18 +62,30 @@ def _draw_stage(ax: Axes, history: History, colours: Mapping[str, str]) -> None:
     ax.set_title(history.title)
     ax.set_xlabel("accepted steps")
     ax.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
-    numbers = np.arange(1, len(history.steps) + 1)
-    if not len(numbers):
+    count = len(history.steps)
+    if not count:
         ax.text(0.5, 0.5, "no steps", transform=ax.transAxes, ha="center", color=QUIET)
         return
-    marker = "o" if len(numbers) < 60 else None
+    ax.set_xlim(0.4, count + 0.6)
+    marker = "o" if count < 60 else None
     for name, colour in colours.items():
-        values = [step.terms.get(name, np.nan) for step in history.steps]
-        if not np.isnan(values).all():
-            ax.plot(numbers, values, color=colour, label=name, marker=marker, markersize=2.5, linewidth=1.2)
-    ax.plot(numbers, [step.value for step in history.steps], color=INK, label="objective", linewidth=2.2)
+        if any(name in step.terms for step in history.steps):
+            ax.plot(*_broken(history.steps, name), color=colour, label=name, marker=marker, markersize=2.5,
+                    linewidth=1.2)
+    ax.plot(*_broken(history.steps), color=INK, label="objective", marker=marker, markersize=3.5, linewidth=2.2)
     _mark_weights(ax, history)
-    ax.margins(x=0.03)
+
+
+def _broken(steps: Sequence[HistoryStep], name: str | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Step numbers and a term's values (default: the sum), with a gap where the weight changes and with it J."""
+    places, values = [], []
+    for number, step in enumerate(steps, 1):
+        if number > 1 and step.weight != steps[number - 2].weight:
+            places.append(number - 0.5)
+            values.append(np.nan)
+        places.append(number)
+        values.append(step.value if name is None else step.terms.get(name, np.nan))
+    return np.array(places), np.array(values)
 
 
 def _mark_weights(ax: Axes, history: History) -> None:

@@ -1,4 +1,4 @@
-"""One look for all figures: colours that colour-blind readers can tell apart, readable sizes, vector and pixel files."""
+"""One look for all figures: colours that colour-blind readers tell apart, readable sizes, vector and pixel files."""
 from __future__ import annotations
 
 import io

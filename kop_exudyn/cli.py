@@ -1,0 +1,82 @@
+"""The command ``kop``: parses arguments, and turns what can go wrong into one line and an exit status."""
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import sys
+from importlib import import_module
+from typing import NoReturn, Sequence
+
+from . import __version__
+from .commands import NAMES
+from .errors import InputError, SimulationFailure
+
+OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+_DESCRIPTION = "Kits of parts for bending-active structures: one small set of pieces that builds many designs."
+_STATUS = """exit status:
+  0    success
+  1    a simulation failed
+  2    unusable input: one line on standard error says what is wrong
+  130  interrupted"""
+
+
+class _Parser(argparse.ArgumentParser):
+    """Errors in one line, like those about files."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(BAD_INPUT, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run ``kop`` with these arguments (default: those of the process); returns the exit status."""
+    args = make_parser().parse_args(argv)
+    _set_up_logging(args)
+    try:
+        status = args.run(args)
+        sys.stdout.flush()  # here, where a reader that has gone can be dealt with
+        return status
+    except InputError as error:
+        return _complain(str(error), BAD_INPUT)
+    except SimulationFailure as failure:
+        return _complain(f"simulation failed: {failure}", FAILED)
+    except KeyboardInterrupt:
+        return _complain("interrupted", INTERRUPTED)
+    except BrokenPipeError:  # the reader of our output has had enough, as in `kop ... | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return OK
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The parser, with all subcommands."""
+    verbosity = argparse.ArgumentParser(add_help=False)
+    group = verbosity.add_mutually_exclusive_group()
+    group.add_argument("-q", "--quiet", action="store_true", help="no progress, errors only")
+    group.add_argument("-v", "--verbose", action="count", default=0, help="say what is being done; twice: every detail")
+    parser = _Parser(prog="kop", description=_DESCRIPTION, epilog=_STATUS,
+                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--version", action="version", version=f"kop_exudyn {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for name in NAMES:
+        command = import_module(f".commands.{name}", __package__)
+        subparser = commands.add_parser(
+            name, parents=[verbosity], help=command.HELP, description=command.DESCRIPTION,
+            epilog=f"{command.EXAMPLES}\n\n{_STATUS}", formatter_class=argparse.RawDescriptionHelpFormatter)
+        command.arguments(subparser)
+        subparser.set_defaults(run=command.run)
+    return parser
+
+
+def _set_up_logging(args: argparse.Namespace) -> None:
+    level = logging.ERROR if args.quiet else [logging.WARNING, logging.INFO, logging.DEBUG][min(args.verbose, 2)]
+    logger = logging.getLogger(__package__)
+    logger.setLevel(level)
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("kop: %(levelname)s: %(message)s"))
+    logger.handlers[:] = [handler]  # once only, also when main is called again
+
+
+def _complain(message: str, status: int) -> int:
+    sys.stderr.write(f"kop: {' '.join(message.split())}\n")
+    return status

@@ -1,0 +1,117 @@
+"""From the outcome of a kit optimisation to what its figures draw."""
+from __future__ import annotations
+
+from typing import Mapping, Sequence
+
+import numpy as np
+
+from ..analysis.kit_result import STAGES, KitResult
+from ..errors import SimulationFailure
+from ..kit.kinds import part_kind
+from ..optimize.objective import Evaluation
+from ..optimize.stages import StageResult
+from ..structures.base import Design, ElementGroup
+from .designs import DrawnDesign, DrawnState
+from .history import History, HistoryStep
+from .parameters import ElementCloud, PartSpace
+
+DRAWN_STAGES = ("direct", "relaxed", "assigned")
+
+
+def drawn_designs(result: KitResult) -> list[DrawnDesign]:
+    """Every design after the drawn stages, placed on its target, over the input design's rods."""
+    drawn = []
+    for n, (design, reference) in enumerate(zip(result.designs, result.references)):
+        states = [drawn_state(design, result.stages[stage].designs[n], stage)
+                  for stage in DRAWN_STAGES if stage in result.stages]
+        role = design.fitted_role.name
+        wanted = design.scene(role).polylines(reference.equilibria[role].state)
+        drawn.append(DrawnDesign(design.name, states, wanted))
+    return drawn
+
+
+def drawn_state(design: Design, outcome: Evaluation | SimulationFailure, title: str) -> DrawnState:
+    """One design's fitted state at its best placement."""
+    if isinstance(outcome, SimulationFailure):
+        return DrawnState(title, failed=outcome.reason)
+    role = design.fitted_role.name
+    state, placement = outcome.equilibria[role].state, outcome.fit.placement
+    return DrawnState(
+        title, [placement.apply(line) for line in design.scene(role).polylines(state)],
+        placement.apply(state.positions[design.joints]), 100 * outcome.fit.distances / outcome.fit.diagonal)
+
+
+def histories(result: KitResult) -> list[History]:
+    """The accepted steps of both stages; the relaxed one's with all its rounds after each other."""
+    titles = {"relaxed": "relaxed: all elements", "assigned": "assigned: parts only"}
+    steps: dict[str, list[HistoryStep]] = {stage: [] for stage in titles}
+    for event in result.events:
+        stage = "relaxed" if event.weight is not None else event.stage
+        if stage in steps:
+            steps[stage].append(HistoryStep(event.terms, event.weight))
+    return [History(title, steps[stage]) for stage, title in titles.items()]
+
+
+def part_spaces(result: KitResult) -> list[PartSpace]:
+    """Parts and elements by kind: the inputs', and those of the relaxed stage where all designs have them."""
+    clouds = {"input elements": [design.parameters for design in result.designs]}
+    relaxed = result.stages["relaxed"].designs
+    if not any(isinstance(outcome, SimulationFailure) for outcome in relaxed):
+        clouds["relaxed elements"] = [outcome.q for outcome in relaxed]
+    groups = [group for design in result.designs for group in design.groups]
+    owners = [n for n, design in enumerate(result.designs) for _ in design.groups]
+    spaces = []
+    for name, parts in result.kit.parts.items():
+        members = [(group, n) for group, n in zip(groups, owners) if group.kind == name]
+        spaces.append(PartSpace(name, part_kind(name).parameter_names, parts,
+                                [_cloud(label, name, members, q) for label, q in clouds.items()]))
+    return spaces
+
+
+def _cloud(label: str, kind_name: str, members: Sequence[tuple[ElementGroup, int]],
+           parameters: Sequence[np.ndarray]) -> ElementCloud:
+    """Elements with the most parameters as the parts that would realise them, the others as plain values."""
+    kind = part_kind(kind_name)
+    most = max(group.indices.shape[1] for group, _ in members)
+    full, ends = [np.empty((0, kind.n_parameters))], [np.empty(0)]
+    for group, n in members:
+        values = parameters[n][group.indices]
+        if group.indices.shape[1] == most:
+            full.append(kind.canonical(kind.variants_of(most).lift(values)))
+        else:
+            ends.append(values.ravel())
+    return ElementCloud(label, np.concatenate(full), np.concatenate(ends))
+
+
+def summary_rows(result: KitResult) -> tuple[list[str], list[list]]:
+    """Headings and rows of the table of all designs: deviations after every stage, then figures of the assigned one."""
+    stages = [stage for stage in STAGES if stage in result.stages]
+    headings = ["design", "elements", *(f"{stage}, max %" for stage in stages), "assigned, mean %", "energy ratio",
+                "stable"]
+    rows = []
+    for n, design in enumerate(result.designs):
+        found = {stage: result.summary(stage, n) for stage in stages}
+        final = found["assigned"]
+        largest = [_fit(found[stage], "max_percent") for stage in stages]
+        rows.append([design.name, design.n_elements, *largest, _fit(final, "mean_percent"), final.get("energy_ratio"),
+                     final.get("stable")])
+    return headings, rows
+
+
+def final_states(result: KitResult) -> dict[tuple[str, str, str], object]:
+    """(design, stage, role) -> state, for all that were found."""
+    return {(design.name, stage, role): equilibrium.state
+            for stage, found in result.stages.items() for design, outcome in zip(result.designs, found.designs)
+            if isinstance(outcome, Evaluation) for role, equilibrium in outcome.equilibria.items()}
+
+
+def remarks(stages: Mapping[str, StageResult]) -> list[str]:
+    """What a reader should know besides the figures: snaps on the way to the parts, and why each SQP stopped."""
+    found = [f"{jump.design} snapped at {jump.fraction:.0%} of the way to its parts: {jump.distance:.1%} of its size."
+             for jump in stages["assigned"].jumps]
+    return found + [f"The {name} stage ended after {stage.steps} steps: {stage.status}."
+                    for name, stage in stages.items() if stage.status]
+
+
+def _fit(summary: Mapping, name: str) -> float | None:
+    return summary["fit"][name] if "fit" in summary else None

@@ -1,0 +1,85 @@
+"""The main job with all that a user sees of it: progress, checkpoints, results and a report in one folder."""
+from __future__ import annotations
+
+import hashlib
+import logging
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from time import perf_counter
+from typing import Any, Iterator, Mapping, Sequence
+
+import numpy as np
+from tqdm import tqdm
+from tqdm.contrib.logging import logging_redirect_tqdm
+
+from ..analysis.kit_result import KitResult
+from ..io.checkpoint import Job
+from ..io.run_folder import RunFolder
+from ..kit.cluster import cluster
+from ..optimize.job import JobSettings, run_job
+from ..optimize.stages import StageEvent
+from ..structures.base import Design
+from .environment import peak_memory_mb
+from .kit_report import write_kit_report
+
+
+def optimize_kit(
+    designs: Sequence[Design], parts: Mapping[str, int], *, out: str | Path, settings: JobSettings = JobSettings(),
+    inputs: Sequence[str | Path] = (), resume: bool = False, overwrite: bool = False, progress: bool = False,
+) -> KitResult:
+    """Find a kit for these designs; write checkpoints on the way, and results and a report in the end.
+
+    parts : kind -> number of parts
+    out : folder for all files; see `RunFolder` for what it may hold
+    inputs : files that the designs were read from; a run is resumed only while they are the same
+    resume : go on from the checkpoints in `out`
+
+    Raises InputError for impossible requests and unusable folders, before anything is simulated, and
+    SimulationFailure when an input design can't be simulated.
+    """
+    begin = perf_counter()
+    _check_request(designs, parts, settings)
+    described = _described(designs, parts, settings)
+    job = described if inputs else described | {"parameters": {d.name: _digest(d.parameters) for d in designs}}
+    folder = RunFolder.open(out, Job.of(job, inputs), resume=resume, overwrite=overwrite)
+    events: list[StageEvent] = []
+    with _progress_bar(progress) as bar:
+        def observe(event: StageEvent) -> None:
+            events.append(event)
+            bar.set_postfix_str(f"{event.stage}: J = {event.record.value:.4g}", refresh=False)
+            bar.update()
+
+        outcome = run_job(designs, parts, settings, folder.store, observe, bar.set_description_str)
+    result = KitResult(
+        list(designs), outcome.references, outcome.stages, events, outcome.equilibria, outcome.newton_iterations,
+        perf_counter() - begin, peak_memory_mb(), described | {"jobs": settings.jobs})
+    write_kit_report(result, folder.path)
+    return result
+
+
+def _check_request(designs: Sequence[Design], parts: Mapping[str, int], settings: JobSettings) -> None:
+    """Raise the clustering's InputError for numbers of parts or bounds that can't be met: it needs no simulation."""
+    offsets = np.cumsum([0, *(len(design.parameters) for design in designs)])
+    groups = [group.shifted(offset) for design, offset in zip(designs, offsets) for group in design.groups]
+    q = np.concatenate([design.parameters for design in designs])
+    cluster(groups, q, parts, bounds=settings.stages.bounds, restarts=1)
+
+
+def _described(designs: Sequence[Design], parts: Mapping[str, int], settings: JobSettings) -> dict[str, Any]:
+    """All that the result depends on; the number of processes is not part of it."""
+    values = asdict(settings)
+    del values["jobs"]
+    return {"designs": [design.name for design in designs], "parts": dict(parts), **values}
+
+
+def _digest(values: np.ndarray) -> str:
+    return hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
+
+
+@contextmanager
+def _progress_bar(shown: bool) -> Iterator[tqdm]:
+    """A bar of accepted steps on standard error; log messages appear above it."""
+    with logging_redirect_tqdm([logging.getLogger("kop_exudyn")]):
+        with tqdm(unit=" steps", disable=not shown, bar_format="{desc}: {n_fmt} steps, {elapsed}{postfix}") as bar:
+            yield bar

@@ -1,0 +1,171 @@
+"""The whole job on a toy class with both kinds of parts: zigzags of beams and corners, held a little too short."""
+import json
+from functools import cached_property
+
+import numpy as np
+import pytest
+
+from kop_exudyn.equilibrium.newton import solve
+from kop_exudyn.errors import InputError
+from kop_exudyn.io.checkpoint import CheckpointStore
+from kop_exudyn.io.kits import load_kit
+from kop_exudyn.io.results import load_result, load_states
+from kop_exudyn.optimize.job import JobSettings
+from kop_exudyn.optimize.stages import StageSettings
+from kop_exudyn.report.kit_drawings import drawn_designs, histories, part_spaces
+from kop_exudyn.report.kit_run import optimize_kit
+from kop_exudyn.rods.rotations import rotation_z
+from kop_exudyn.scene.builder import SceneBuilder
+from kop_exudyn.structures.base import Design, ElementGroup, Role, Target
+
+STIFFNESS = np.array([1e4, 4e3, 4e3, 0.8, 1.0, 1.0])
+SETTINGS = JobSettings(jobs=1, stages=StageSettings(schedule=(1e3, 1e5), path_steps=4))
+
+
+class Zigzag(Design):
+    """Straight beams with corners of given angles between them, one end clamped, the other pinned too near."""
+
+    class_name = "toy_zigzag"
+
+    def __init__(self, name: str, lengths: np.ndarray, angles: np.ndarray):
+        self.name = name
+        self.n = len(lengths)
+        self.parameters = np.concatenate([lengths.ravel(), angles])
+        self.lower = np.concatenate([np.full(2 * self.n, 0.02), np.full(self.n - 1, -3.0)])
+        self.upper = np.concatenate([np.full(2 * self.n, np.inf), np.full(self.n - 1, 3.0)])
+        self.groups = [ElementGroup("linear", np.arange(2 * self.n).reshape(-1, 2)),
+                       ElementGroup("angular", np.arange(2 * self.n, 3 * self.n - 1)[:, None])]
+        self.roles = (Role("deployed", fitted=True),)
+        self._scene = self._build(lengths, angles)
+
+    def _build(self, lengths, angles):
+        builder = SceneBuilder(len(self.parameters))
+        turns = np.concatenate([[0], np.cumsum(angles)])
+        steps = np.stack([np.cos(turns), np.sin(turns), 0 * turns], axis=1)
+        corners = 0.97 * np.concatenate([[np.zeros(3)], np.cumsum(lengths.sum(axis=1)[:, None] * steps, axis=0)])
+        middles = corners[:-1] + 0.97 * lengths[:, :1] * steps
+        ends = builder.bodies(corners, rotation_z(np.append(turns[:1], turns)))
+        self.joints = builder.bodies(middles, rotation_z(turns))
+        hinges = builder.hinges(np.zeros(self.n - 1), parameter=np.arange(2 * self.n, 3 * self.n - 1), prescribed=True)
+        for k in range(self.n):
+            turned = -1 if k == 0 else hinges[k - 1]
+            first = builder.nodes(ends[k:k + 1], np.array([turned]))[0]
+            middle, last = (builder.nodes(b)[0] for b in (self.joints[k:k + 1], ends[k + 1:k + 2]))
+            builder.rod([first, middle], STIFFNESS, parameter=2 * k)
+            builder.rod([middle, last], STIFFNESS, parameter=2 * k + 1)
+        builder.pin(ends[0])
+        builder.pin(ends[-1], (0, 1, 2))
+        return builder.build()
+
+    def scene(self, role):
+        return self._scene
+
+    def deploy(self, q=None):
+        return {"deployed": solve(self.systems["deployed"], self.parameters if q is None else q)}
+
+    @cached_property
+    def target(self):
+        joints = self.deploy()["deployed"].state.positions[self.joints]
+        strip = np.concatenate([joints + [0, 0, z] for z in (-0.1, 0.1)])
+        faces = [f for k in range(self.n - 1)
+                 for f in ((k, k + 1, self.n + k), (k + 1, self.n + k + 1, self.n + k))]
+        return Target(strip, np.array(faces), joints, float(np.linalg.norm(np.ptp(joints, axis=0))))
+
+
+def zigzags() -> list[Zigzag]:
+    generator = np.random.default_rng(5)
+    return [Zigzag(f"zigzag {k}", 0.3 + 0.1 * generator.random((4, 2)), 0.6 * generator.random(3) - 0.3)
+            for k in range(2)]
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A finished run, and its folder."""
+    out = tmp_path_factory.mktemp("run") / "out"
+    return optimize_kit(zigzags(), {"linear": 3, "angular": 2}, out=out, settings=SETTINGS), out
+
+
+def test_the_folder_holds_all_that_is_promised(finished):
+    result, out = finished
+    names = {path.name for path in out.iterdir()}
+    figures = {f"{name}.{suffix}" for name in ("designs", "history", "parameters") for suffix in ("svg", "png")}
+    assert names == figures | {"result.json", "kit.json", "states.npz", "index.html", "checkpoints"}
+    np.testing.assert_array_equal(load_kit(out / "kit.json").vector, result.kit.vector)
+    state = load_states(out / "states.npz")["zigzag 1", "assigned", "deployed"]
+    kept = result.stages["assigned"].designs[1].equilibria["deployed"].state
+    np.testing.assert_array_equal(state["positions"], kept.positions)
+
+
+def test_result_file(finished):
+    result, out = finished
+    data = load_result(out / "result.json")
+    assert [design["name"] for design in data["designs"]] == ["zigzag 0", "zigzag 1"]
+    assert data["designs"][0]["elements"] == 7
+    assert (len(data["kit"]["linear"]), len(data["kit"]["angular"])) == (3, 2)
+    assert data["settings"]["parts"] == {"linear": 3, "angular": 2}
+    assert data["peak_memory_mb"] > 0
+
+
+def test_drawings_show_the_result(finished):
+    result, out = finished
+    for n, drawn in enumerate(drawn_designs(result)):
+        assert [state.title for state in drawn.states] == ["direct", "relaxed", "assigned"]
+        for state in drawn.states:
+            fit = result.stages[state.title].designs[n].fit
+            assert max(state.deviation_percent) == pytest.approx(fit.max_percent)
+            assert len(state.chains) == len(drawn.wanted) == 8
+    relaxed, assigned = histories(result)
+    assert len(relaxed.steps) == result.stages["relaxed"].steps
+    assert len(assigned.steps) == result.stages["assigned"].steps
+    assert relaxed.steps[-1].value == pytest.approx(result.stages["relaxed"].value)
+    spaces = {space.kind: space for space in part_spaces(result)}
+    assert spaces["linear"].clouds[0].full.shape == (8, 2)
+    assert spaces["angular"].clouds[1].full.shape == (6, 1)
+    assert np.all(spaces["angular"].clouds[0].full >= 0)
+
+
+def test_the_page_names_designs_and_settings(finished):
+    page = (finished[1] / "index.html").read_text(encoding="utf-8")
+    for piece in ("One kit of parts for 2 designs", "zigzag 1", "2 angular", "relaxed_steps", "exudyn"):
+        assert piece in page
+
+
+def test_killed_and_resumed_gives_the_same(finished, tmp_path, monkeypatch):
+    result, out = finished
+    save = CheckpointStore.save
+    saved = []
+
+    def dies_at_the_third(self, name, arrays):
+        save(self, name, arrays)
+        saved.append(name)
+        if len(saved) == 3:
+            raise KeyboardInterrupt
+
+    arguments = {"out": tmp_path / "out", "settings": SETTINGS}
+    with monkeypatch.context() as patch:
+        patch.setattr(CheckpointStore, "save", dies_at_the_third)
+        with pytest.raises(KeyboardInterrupt):
+            optimize_kit(zigzags(), {"linear": 3, "angular": 2}, **arguments)
+    assert not (tmp_path / "out" / "result.json").exists()
+    resumed = optimize_kit(zigzags(), {"linear": 3, "angular": 2}, resume=True, **arguments)
+    np.testing.assert_array_equal(resumed.kit.vector, result.kit.vector)
+    volatile = {"wall_s", "peak_memory_mb", "exudyn"}
+    first, second = (json.loads((folder / "result.json").read_text(), object_pairs_hook=lambda pairs: {
+        key: value for key, value in pairs if key not in volatile}) for folder in (out, tmp_path / "out"))
+    assert first == second
+
+
+def test_another_job_is_not_resumed(finished):
+    with pytest.raises(InputError, match="different job: parts.linear was 3 and is now 4"):
+        optimize_kit(zigzags(), {"linear": 4, "angular": 2}, out=finished[1], settings=SETTINGS, resume=True)
+
+
+@pytest.mark.parametrize("parts, message", [
+    ({"linear": 9, "angular": 2}, r"parts.linear = 9: more parts than elements \(8\)"),
+    ({"linear": 3}, "parts.angular: the designs have elements of this kind"),
+    ({"linear": 3, "angular": 2, "cell": 1}, "parts.cell = 1: the designs have no elements of this kind"),
+])
+def test_impossible_requests_fail_before_anything_is_written(tmp_path, parts, message):
+    with pytest.raises(InputError, match=message):
+        optimize_kit(zigzags(), parts, out=tmp_path / "out", settings=SETTINGS)
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,258 @@
+"""The command line: what it accepts, what it says, and with which exit status it ends."""
+import json
+import logging
+import subprocess
+import sys
+import time
+from types import SimpleNamespace
+
+import pytest
+
+from kop_exudyn import __version__, cli
+from kop_exudyn.analysis import simulation
+from kop_exudyn.commands import NAMES
+from kop_exudyn.errors import InputError, SimulationFailure
+from kop_exudyn.report import kit_run
+from kop_exudyn.structures import base
+
+ANSWER = {
+    "design": "arch", "unknowns": 120, "elements": 20, "newton_iterations": 12, "wall_s": 0.5, "elastic_energy": 1.25,
+    "stable": True, "opening_angle": 0.6, "exudyn": {"version": "1.13", "newton_steps": 1, "residual": 1e-12,
+                                                    "moved": 1e-12, "wall_s": 0.1},
+    "fit": {"max_percent": 1.5, "mean_percent": 0.5}, "joints": [[0.0, 0.0, 0.0]],
+}
+
+
+@pytest.fixture(autouse=True)
+def quiet_loggers():
+    """Leaves the package's logger as it was."""
+    logger = logging.getLogger("kop_exudyn")
+    before = logger.level, logger.handlers[:]
+    yield
+    logger.setLevel(before[0])
+    logger.handlers[:] = before[1]
+
+
+@pytest.fixture
+def design_file(monkeypatch, write_json_file):
+    """A design of a class whose reader only keeps the name."""
+    monkeypatch.setitem(base._REGISTRY, "named", lambda data, source: SimpleNamespace(name=data["name"]))
+    return write_json_file("set/arch.json", {"format": "kop_exudyn/design", "version": 1, "class": "named",
+                                             "name": "arch"})
+
+
+@pytest.fixture
+def simulated(monkeypatch):
+    """Replaces the simulation by a known answer, or by an error put into the dict."""
+    outcome = {}
+
+    def simulate(design):
+        if "error" in outcome:
+            raise outcome["error"]
+        return SimpleNamespace(to_dict=lambda: ANSWER)
+
+    monkeypatch.setattr(simulation, "simulate", simulate)
+    return outcome
+
+
+def status_of(*arguments) -> int:
+    """The exit status, whether main returns it or argparse exits with it."""
+    try:
+        return cli.main([str(argument) for argument in arguments])
+    except SystemExit as end:
+        return end.code
+
+
+class TestHelp:
+    def test_help_lists_commands_and_exit_status(self, capsys):
+        assert status_of("--help") == 0
+        text = capsys.readouterr().out
+        for word in (*NAMES, "exit status", "130"):
+            assert word in text
+
+    @pytest.mark.parametrize("name", NAMES)
+    def test_every_command_has_examples(self, name, capsys):
+        assert status_of(name, "--help") == 0
+        text = capsys.readouterr().out
+        assert f"examples:\n  kop {name} " in text and "exit status" in text
+        assert max(map(len, text.splitlines())) <= 120
+
+    def test_version(self, capsys):
+        assert status_of("--version") == 0
+        assert capsys.readouterr().out == f"kop_exudyn {__version__}\n"
+
+    def test_help_is_quick_and_loads_no_library(self):
+        code = ("import sys\nfrom kop_exudyn.cli import make_parser\nmake_parser().format_help()\n"
+                "print(*(m for m in ('numpy', 'scipy', 'exudyn', 'matplotlib', 'jsonschema') if m in sys.modules))")
+        begin = time.perf_counter()
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        assert done.stdout.strip() == ""
+        assert time.perf_counter() - begin < 3  # a tenth of a second on an idle machine; this one may be busy
+
+    def test_as_a_module(self):
+        done = subprocess.run([sys.executable, "-m", "kop_exudyn", "--version"], capture_output=True, text=True)
+        assert (done.returncode, done.stdout) == (0, f"kop_exudyn {__version__}\n")
+
+
+class TestArguments:
+    @pytest.mark.parametrize("parts, message", [
+        ("linear", "expected KIND=NUMBER,..., got 'linear'"),
+        ("linear=0", "the number of linear parts must be a whole number, at least 1, got '0'"),
+        ("linear=-3", "got '-3'"),
+        ("linear=2.5", "got '2.5'"),
+        ("linear=", "got ''"),
+        ("=3", "expected KIND=NUMBER"),
+        ("linear=3,,angular=2", "expected KIND=NUMBER"),
+        ("linear=3,linear=4", "the kind 'linear' is given twice"),
+    ])
+    def test_parts_that_make_no_sense(self, parts, message, capsys, tmp_path):
+        assert status_of("optimize", tmp_path, "--parts", parts, "--out", tmp_path / "out") == 2
+        error = capsys.readouterr().err
+        assert message in error and error.count("\n") == 1
+
+    def test_unknown_kind_of_parts(self, capsys, design_file, tmp_path):
+        assert status_of("optimize", design_file.parent, "--parts", "cubic=3", "--out", tmp_path / "out") == 2
+        error = capsys.readouterr().err
+        assert "'cubic': unknown kind of parts (known: angular," in error and error.count("\n") == 1
+        assert not (tmp_path / "out").exists()
+
+    @pytest.mark.parametrize("arguments, message", [
+        ((), "required: COMMAND"),
+        (("fly",), "invalid choice: 'fly'"),
+        (("simulate",), "required: DESIGN"),
+        (("optimize", "x", "--out", "y"), "required: --parts"),
+        (("optimize", "x", "--parts", "linear=1"), "required: --out"),
+        (("optimize", "x", "--parts", "linear=1", "--out", "y", "--jobs", "0"), "--jobs: the value must be a whole"),
+        (("optimize", "x", "--parts", "linear=1", "--out", "y", "--designs", "0"), "--designs: the number of"),
+        (("optimize", "x", "--parts", "linear=1", "--out", "y", "--designs", "a,,b"), "--designs: expected a number"),
+        (("optimize", "x", "--parts", "linear=1", "--out", "y", "--seed", "-1"), "--seed: the value must be a whole"),
+        (("simulate", "x", "-q", "-v"), "not allowed with"),
+    ])
+    def test_one_line_and_status_2(self, arguments, message, capsys):
+        assert status_of(*arguments) == 2
+        output = capsys.readouterr()
+        assert message in output.err and output.err.count("\n") == 1 and output.out == ""
+
+
+class TestSimulate:
+    def test_json(self, design_file, simulated, capsys):
+        assert status_of("simulate", design_file, "--json") == 0
+        output = capsys.readouterr()
+        assert json.loads(output.out) == ANSWER and output.err == ""
+
+    def test_for_people(self, design_file, simulated, capsys):
+        assert status_of("simulate", design_file) == 0
+        text = capsys.readouterr().out
+        for piece in ("arch", "max 1.5 %", "20 elements", "0.6 rad", "1.25"):
+            assert piece in text
+
+    def test_a_failure_is_data_with_json(self, design_file, simulated, capsys):
+        simulated["error"] = SimulationFailure("no equilibrium", where="deployed state")
+        assert status_of("simulate", design_file, "--json") == 1
+        output = capsys.readouterr()
+        assert json.loads(output.out) == {"design": "arch", "failed": "deployed state: no equilibrium"}
+        assert output.err == "kop: simulation failed: deployed state: no equilibrium\n"
+
+    def test_a_failure_is_one_line_without(self, design_file, simulated, capsys):
+        simulated["error"] = SimulationFailure("no equilibrium,\nnot even one")
+        assert status_of("simulate", design_file) == 1
+        output = capsys.readouterr()
+        assert output.out == "" and output.err == "kop: simulation failed: no equilibrium, not even one\n"
+
+    @pytest.mark.parametrize("content, message", [
+        ("{", "not JSON: line 1, column 2"),
+        ('{"format": "kop_exudyn/design", "version": 1, "class": "c_shell", "name": "a", "young": NaN}', "NaN is not"),
+        ('{"format": "kop_exudyn/design", "version": 9}', "version = 9: written for a newer kop_exudyn"),
+    ])
+    def test_unusable_files(self, content, message, tmp_path, capsys):
+        file = tmp_path / "bad.json"
+        file.write_text(content)
+        assert status_of("simulate", file, "--json") == 2
+        output = capsys.readouterr()
+        assert output.out == "" and output.err.startswith(f"kop: {file}: ")
+        assert message in output.err and output.err.count("\n") == 1
+
+    def test_missing_file(self, tmp_path, capsys):
+        assert status_of("simulate", tmp_path / "no.json") == 2
+        assert capsys.readouterr().err == f"kop: {tmp_path / 'no.json'}: no such file\n"
+
+    def test_interruption(self, design_file, simulated, capsys):
+        simulated["error"] = KeyboardInterrupt()
+        assert status_of("simulate", design_file) == 130
+        assert capsys.readouterr().err == "kop: interrupted\n"
+
+    def test_a_bug_is_not_hidden(self, design_file, simulated):
+        simulated["error"] = ZeroDivisionError()
+        with pytest.raises(ZeroDivisionError):
+            status_of("simulate", design_file)
+
+
+class TestOptimize:
+    @pytest.fixture
+    def asked(self, monkeypatch):
+        """Replaces the optimisation; collects what it was asked for."""
+        asked = {"failed": []}
+
+        def optimize_kit(designs, parts, **options):
+            asked.update(designs=[design.name for design in designs], parts=parts, **options)
+            summary = lambda stage, n: {"failed": "no"} if designs[n].name in asked["failed"] else {}  # noqa: E731
+            return SimpleNamespace(designs=designs, summary=summary)
+
+        monkeypatch.setattr(kit_run, "optimize_kit", optimize_kit)
+        return asked
+
+    def test_options_arrive(self, asked, design_file, tmp_path, capsys):
+        out = tmp_path / "out"
+        assert status_of("optimize", design_file.parent, "--parts", "linear=12,angular=5", "--out", out, "--seed", 3,
+                         "--jobs", 2, "--max-steps", 7, "--designs", 1, "--resume", "-q") == 0
+        assert asked["designs"] == ["arch"] and asked["parts"] == {"linear": 12, "angular": 5}
+        assert asked["out"] == out and asked["inputs"] == [design_file]
+        assert (asked["resume"], asked["overwrite"], asked["progress"]) == (True, False, False)
+        settings = asked["settings"]
+        assert (settings.jobs, settings.stages.seed) == (2, 3)
+        assert settings.stages.relaxed_steps == settings.stages.assigned_steps == 7
+        assert capsys.readouterr().out == f"{out / 'index.html'}\n"
+
+    def test_a_design_that_fails_in_the_end(self, asked, design_file, tmp_path, capsys):
+        asked["failed"] = ["arch"]
+        assert status_of("optimize", design_file.parent, "--parts", "linear=1", "--out", tmp_path / "out") == 1
+        assert "can't be built from the kit: arch" in capsys.readouterr().err
+
+    def test_designs_by_name(self, asked, design_file, tmp_path, capsys):
+        arguments = ("optimize", design_file.parent, "--parts", "linear=1", "--out", tmp_path / "out", "--designs")
+        assert status_of(*arguments, "arch") == 0
+        assert status_of(*arguments, "arch,vault") == 2
+        assert "designs = 'vault': no such design (there are arch)" in capsys.readouterr().err
+
+
+def test_verbosity(design_file, simulated):
+    for flags, level in (([], logging.WARNING), (["-v"], logging.INFO), (["-vv"], logging.DEBUG),
+                         (["-q"], logging.ERROR)):
+        assert status_of("simulate", design_file, *flags) == 0
+        assert logging.getLogger("kop_exudyn").level == level
+        assert len(logging.getLogger("kop_exudyn").handlers) == 1
+
+
+def test_messages_are_one_line_whatever_the_value(design_file, simulated, capsys):
+    simulated["error"] = InputError("is odd", field="points", value="a\nb")
+    assert status_of("simulate", design_file) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize("joints", [1, 100_000])
+def test_a_reader_that_stops_early_is_no_error(joints):
+    code = f"""
+import sys
+from types import SimpleNamespace
+from kop_exudyn import cli
+from kop_exudyn.analysis import simulation
+from kop_exudyn.io import designs
+designs.load_design = lambda path: None
+simulation.simulate = lambda design: SimpleNamespace(to_dict=lambda: {{"joints": [[0.0] * 3] * {joints}}})
+sys.exit(cli.main(["simulate", "x", "--json"]))
+"""
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process.stdout.close()
+    with process.stderr:
+        assert process.stderr.read() == ""
+    assert process.wait() == 0
