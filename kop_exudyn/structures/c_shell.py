@@ -27,7 +27,7 @@ from .base import Design, Role, Target, register
 from .c_shell_scenes import Layout, ShellScene, smooth_scene, straight_scene
 from .curve_network import network_of
 from .planar_curve import PlanarCurve
-from .straightening import straighten
+from .straight_network import straighten
 
 _OPENING_STEP = 0.1  # rad of mean joint angle a step
 _SHORTEST = 0.1  # of the median length: shorter pieces are no sensible parts

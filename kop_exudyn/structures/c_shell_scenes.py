@@ -14,7 +14,7 @@ from ..rods.sections import Material, Section
 from ..scene.builder import SceneBuilder
 from ..scene.scene import Scene
 from .curve_network import CurveNetwork
-from .straightening import StraightNetwork, StraightRod
+from .straight_network import StraightNetwork, StraightRod
 
 PLANAR = (2, 3, 4)  # height, and turns out of the plane: what an assembly lying on the floor can't do
 

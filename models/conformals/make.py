@@ -1,62 +1,72 @@
-"""Writes ten C-shell designs: images of one uniform 9 x 9 grid under ten conformal maps, in comparable scales.
+"""Writes the ten designs of this folder: one square grid under ten conformal maps, with the same mean span.
 
-    python models/conformals/make.py
-
-A conformal map turns a uniform grid into a curved one whose lines still cross at right angles and whose cells stay
-nearly square, so that it keeps opening like a scissor grid. Every design is scaled to the same mean span.
+A conformal map keeps the grid's right angles, so each image is a net that can open like a scissor grid, with spans and
+curvatures of its own. Run it from anywhere: python models/conformals/make.py
 """
 from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Callable
 
 import numpy as np
 
 JOINTS = 9  # a side
-MEAN_SPAN = 0.2
-POINTS_A_SPAN = 3
+POINTS_PER_SPAN = 4
+SPAN = 0.2  # mean distance of neighbouring joints, m
+DIGITS = 9
 
-# name: (map of the square |x|, |y| <= 0.8, change of the mean joint angle in rad)
-MAPS = {
-    "sinh": (lambda z: np.sinh(0.8 * z) / 0.8, 0.60),
-    "tanh": (lambda z: np.tanh(0.7 * z) / 0.7, 0.55),
-    "exp": (lambda z: np.exp(0.6 * z) / 0.6, 0.60),
-    "cubic": (lambda z: z + 0.12 * z**3, 0.60),
-    "sine": (lambda z: np.sin(0.9 * z) / 0.9, 0.60),
-    "moebius": (lambda z: z / (1 - 0.3 * z), 0.55),
-    "log": (lambda z: np.log(z + 2.2), 0.60),
-    "root": (lambda z: np.sqrt(z + 1.8), 0.60),
-    "square": (lambda z: z + 0.14 * z**2, 0.55),
-    "joukowski": (lambda z: (z + 2.4) + 1.2 / (z + 2.4), 0.60),
+Map = Callable[[np.ndarray], np.ndarray]
+# Each map on the square [-1, 1]^2, where none of them has a singular or critical point.
+MAPS: dict[str, Map] = {
+    "sinh": lambda z: np.sinh(0.75 * z),
+    "tanh": lambda z: np.tanh(0.55 * z),
+    "exp": lambda z: np.exp((0.45 + 0.25j) * z),
+    "cubic": lambda z: z + (0.09 - 0.06j) * z**3,
+    "sine": lambda z: np.sin(0.7 * z + 0.35),
+    "moebius": lambda z: (z + 0.2) / (1 + (0.16 + 0.16j) * z),
+    "log": lambda z: np.log(z + 2.3 + 0.4j),
+    "root": lambda z: np.sqrt(z + 1.9 - 0.7j),
+    "square": lambda z: z + (0.12 + 0.08j) * z**2,
+    "joukowski": lambda z: (w := z + 2.5 + 0.6j) + 1.2 / w,
 }
 
 
-def curves(conformal) -> list[np.ndarray]:
-    """Points (n, 2) along the images of both families of grid lines."""
-    stations = np.linspace(-0.8, 0.8, JOINTS)
-    along = np.linspace(-0.8, 0.8, POINTS_A_SPAN * (JOINTS - 1) + 1)
-    lines = [along + 1j * s for s in stations] + [s + 1j * along for s in stations]
-    images = [conformal(line) for line in lines]
-    spans = [np.abs(np.diff(image[::POINTS_A_SPAN])) for image in images]
-    scale = MEAN_SPAN / np.mean(spans)
-    centre = np.mean([image.mean() for image in images])
-    return [scale * np.column_stack([(image - centre).real, (image - centre).imag]) for image in images]
-
-
-def design(name: str, conformal, opening: float) -> dict:
+def design(name: str, image: Map) -> dict:
+    """The design file's content for one map."""
+    joints = np.linspace(-1, 1, JOINTS)
+    along = np.linspace(-1, 1, POINTS_PER_SPAN * (JOINTS - 1) + 1)
+    lines = [image(along + 1j * y) for y in joints] + [image(x + 1j * along) for x in joints]
+    at_joints = np.array([line[::POINTS_PER_SPAN] for line in lines])
+    scale = SPAN / np.abs(np.diff(at_joints, axis=1)).mean()
+    centre = at_joints[:JOINTS].mean()
+    curves = [{"type": "spline", "points": rounded(scale * (line - centre)), "closed": False} for line in lines]
     return {
         "format": "kop_exudyn/design", "version": 1, "class": "c_shell", "name": name,
-        "material": {"young": 2.1e9, "poisson": 0.35, "density": 900.0, "elastic_limit": 4.0e7},
+        "material": {"young": 2.1e9, "poisson": 0.35},
         "section": {"type": "rectangle", "width": 0.03, "height": 0.004},
-        "curves": [{"type": "spline", "points": np.round(line, 9).tolist(), "closed": False}
-                   for line in curves(conformal)],
-        "crossings": "find", "free_ends": False, "rod_offset": 0.0,
-        "opening": {"angle": opening, "side": "up"}, "elements_per_piece": 2,
+        "curves": curves, "crossings": "find", "free_ends": False, "rod_offset": 0.0,
+        "opening": {"angle": 0.6, "side": "up"}, "elements_per_piece": 2,
     }
 
 
+def rounded(points: np.ndarray) -> list[list[float]]:
+    """Complex points as pairs of short decimals, without negative zeros."""
+    return [[round(float(z.real), DIGITS) + 0.0, round(float(z.imag), DIGITS) + 0.0] for z in points]
+
+
+def write(folder: Path) -> list[Path]:
+    """Write all designs; returns their files."""
+    files = []
+    for number, (name, image) in enumerate(MAPS.items(), 1):
+        path = folder / f"{number:02d}_{name}.json"
+        content = design(f"conformal_{number:02d}_{name}", image)
+        curves = ",\n  ".join(json.dumps(curve) for curve in content.pop("curves"))
+        head = json.dumps(content, indent=1)
+        path.write_text(f'{head[:-2]},\n "curves": [\n  {curves}\n ]\n}}\n', encoding="utf-8")
+        files.append(path)
+    return files
+
+
 if __name__ == "__main__":
-    folder = Path(__file__).parent
-    for number, (name, (conformal, opening)) in enumerate(MAPS.items(), start=1):
-        text = json.dumps(design(name, conformal, opening))
-        (folder / f"{number:02d}_{name}.json").write_text(text + "\n")
+    write(Path(__file__).resolve().parent)
