@@ -61,7 +61,8 @@ def part_spaces(result: KitResult) -> list[PartSpace]:
     groups = [group for design in result.designs for group in design.groups]
     owners = [n for n, design in enumerate(result.designs) for _ in design.groups]
     spaces = []
-    for name, parts in result.kit.parts.items():
+    kinds = sorted(result.kit.parts.items(), key=lambda item: -item[1].shape[1])  # planes before histograms
+    for name, parts in kinds:
         members = [(group, n) for group, n in zip(groups, owners) if group.kind == name]
         spaces.append(PartSpace(name, part_kind(name).parameter_names, parts,
                                 [_cloud(label, name, members, q) for label, q in clouds.items()]))

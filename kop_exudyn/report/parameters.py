@@ -91,7 +91,8 @@ def _draw_line(ax: Axes, space: PartSpace) -> None:
     for cloud, value, colour, fill in zip(space.clouds, values, _CLOUD_COLOURS, ("bar", "step", "step")):
         ax.hist(value, edges, color=colour, label=cloud.label, histtype=fill, linewidth=1.4)
     height = ax.get_ylim()[1]
-    ax.set(xlim=(edges[0], edges[-1]), ylim=(0, 1.32 * height))
+    margin = 0.03 * np.ptp(edges)
+    ax.set(xlim=(edges[0] - margin, edges[-1] + margin), ylim=(0, 1.32 * height))
     for part in parts:
         ax.axvline(part, ymax=1.05 / 1.32, color=_PART, linewidth=1.1, linestyle=(0, (2, 1.5)),
                    label="parts" if part == parts[0] else None)
