@@ -17,22 +17,23 @@ SPAN = 0.2  # mean distance of neighbouring joints, m
 DIGITS = 9
 
 Map = Callable[[np.ndarray], np.ndarray]
-# Each map on the square [-1, 1]^2, where none of them has a singular or critical point.
-MAPS: dict[str, Map] = {
-    "sinh": lambda z: np.sinh(0.75 * z),
-    "tanh": lambda z: np.tanh(0.55 * z),
-    "exp": lambda z: np.exp((0.45 + 0.25j) * z),
-    "cubic": lambda z: z + (0.09 - 0.06j) * z**3,
-    "sine": lambda z: np.sin(0.7 * z + 0.35),
-    "moebius": lambda z: (z + 0.2) / (1 + (0.16 + 0.16j) * z),
-    "log": lambda z: np.log(z + 2.3 + 0.4j),
-    "root": lambda z: np.sqrt(z + 1.9 - 0.7j),
-    "square": lambda z: z + (0.12 + 0.08j) * z**2,
-    "joukowski": lambda z: (w := z + 2.5 + 0.6j) + 1.2 / w,
+# Each map on the square [-1, 1]^2, where none of them has a singular or critical point; and the change of the mean joint
+# angle, rad: well past the bifurcation out of the plane, well before the next one.
+MAPS: dict[str, tuple[Map, float]] = {
+    "sinh": (lambda z: np.sinh(0.75 * z), 0.50),
+    "tanh": (lambda z: np.tanh(0.55 * z), 0.85),
+    "exp": (lambda z: np.exp((0.45 + 0.25j) * z), 0.90),
+    "cubic": (lambda z: z + (0.09 - 0.06j) * z**3, 0.50),
+    "sine": (lambda z: np.sin(0.7 * z + 0.35), 0.50),
+    "moebius": (lambda z: (z + 0.2) / (1 + (0.16 + 0.16j) * z), 0.90),
+    "log": (lambda z: np.log(z + 2.3 + 0.4j), 0.70),
+    "root": (lambda z: np.sqrt(z + 1.9 - 0.7j), 0.85),
+    "square": (lambda z: z + (0.12 + 0.08j) * z**2, 0.85),
+    "joukowski": (lambda z: (w := z + 2.5 + 0.6j) + 1.2 / w, 0.50),
 }
 
 
-def design(name: str, image: Map) -> dict:
+def design(name: str, image: Map, opening: float) -> dict:
     """The design file's content for one map."""
     joints = np.linspace(-1, 1, JOINTS)
     along = np.linspace(-1, 1, POINTS_PER_SPAN * (JOINTS - 1) + 1)
@@ -43,10 +44,10 @@ def design(name: str, image: Map) -> dict:
     curves = [{"type": "spline", "points": rounded(scale * (line - centre)), "closed": False} for line in lines]
     return {
         "format": "kop_exudyn/design", "version": 1, "class": "c_shell", "name": name,
-        "material": {"young": 2.1e9, "poisson": 0.35},
+        "material": {"young": 2.1e9, "poisson": 0.35, "density": 900.0, "elastic_limit": 4.0e7},
         "section": {"type": "rectangle", "width": 0.03, "height": 0.004},
         "curves": curves, "crossings": "find", "free_ends": False, "rod_offset": 0.0,
-        "opening": {"angle": 0.6, "side": "up"}, "elements_per_piece": 2,
+        "opening": {"angle": opening, "side": "up"}, "elements_per_piece": 2,
     }
 
 
@@ -58,9 +59,9 @@ def rounded(points: np.ndarray) -> list[list[float]]:
 def write(folder: Path) -> list[Path]:
     """Write all designs; returns their files."""
     files = []
-    for number, (name, image) in enumerate(MAPS.items(), 1):
+    for number, (name, (image, opening)) in enumerate(MAPS.items(), 1):
         path = folder / f"{number:02d}_{name}.json"
-        content = design(f"conformal_{number:02d}_{name}", image)
+        content = design(name, image, opening)
         curves = ",\n  ".join(json.dumps(curve) for curve in content.pop("curves"))
         head = json.dumps(content, indent=1)
         path.write_text(f'{head[:-2]},\n "curves": [\n  {curves}\n ]\n}}\n', encoding="utf-8")
