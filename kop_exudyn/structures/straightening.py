@@ -1,9 +1,15 @@
-"""Straightening a planar curve network: straight pieces, one corner between neighbouring joints.
+"""Straightened networks: every curve becomes straight pieces, one corner between neighbouring joints.
 
-A linear element is one straight beam from corner to corner with its joint in between, along the curve's tangent at the
-joint. So the corner between two joints is where their tangents meet. Where they don't meet between the joints (spans
-with an inflection, or nearly straight ones) the corner goes to the middle of the chord and keeps the turning between
-the tangents as its angle; such a design doesn't assemble stress-free, and the assembly state shows by how much.
+A piece runs from corner to corner and holds its joint somewhere in between, so it is a line through the joint, by
+default along the curve's tangent, and the corner is where the lines of neighbouring joints meet. Then the pieces
+assemble without stress, in the plane, with all joints where they were.
+
+Two tangents meet between their joints only if the span bends to one side. Where it doesn't (an inflection), or so
+unevenly that one half-piece would be very short, the directions of the strand's lines are changed as little as
+possible (least squares) until every corner lies ahead of one joint and behind the next, and no half-piece is shorter
+than a tenth of the other. Turning a line at a joint costs nothing: the hinge takes it up. The alternative, tangents
+kept and the corner put at the chord's middle, leaves a misfit of the order of the span's turning that the rods would
+have to bend for; it is the fall-back where no such directions exist.
 """
 from __future__ import annotations
 
@@ -11,106 +17,167 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .base import ElementGroup
-from .curve_network import CurveNetwork, Run
+from ..errors import InputError
+from .network import Strand
 
-# A corner closer to a joint than this share of the chord would make a useless stub.
-_SHORTEST = 0.12
+# Smallest ratio of a corner's two half-pieces.
+_LEAST_RATIO = 0.1
+# A span that turns further than this can't be followed by one corner.
+_MOST_TURNING = np.radians(150.0)
+# Directions change by at most this, rad; beyond, the net would be another one.
+_MOST_SHIFT = 0.6
+_FLAT = 1e-9
 
 
 @dataclass(frozen=True)
-class StraightRod:
-    """One straightened curve: numbers of its parameters in the design's vector q.
+class StraightStrand:
+    """One curve's straight pieces.
 
-    run : the curve and its joints
-    before, after (spans,) : length from the span's first joint to its corner, from the corner to its last joint
-    corners (spans,) : corner angles
-    tips : lengths beyond the first and the last joint, -1 where the rod ends at the joint
-    headings (spans,) : direction of the piece before each corner in the flat network, rad
-    points (spans, 2) : corners in the flat network
+    angles (J,) : directions of the lines at the joints, rad, continuous along the strand
+    lengths (n_spans, 2) : of each span's half-pieces: joint to corner, corner to next joint
+    corners (n_spans,) : signed corner angles, rad
+    exact (n_spans,) : whether the corner is the lines' intersection (no stress) or the fall-back
     """
 
-    run: Run
-    before: np.ndarray
-    after: np.ndarray
+    strand: Strand
+    angles: np.ndarray
+    lengths: np.ndarray
     corners: np.ndarray
-    tips: tuple[int, int]
-    headings: np.ndarray
-    points: np.ndarray
+    exact: np.ndarray
+
+
+def straighten(strand: Strand, joints: np.ndarray, field: str = "curve") -> StraightStrand:
+    """Straight pieces for one strand of a network with joints (n, 2).
+
+    Raises InputError where a span turns further than one corner can follow.
+    """
+    spans = _Spans.of(strand, joints)
+    worst = np.argmax(np.abs(strand.turnings)) if strand.n_spans else 0
+    if strand.n_spans and abs(strand.turnings[worst]) > _MOST_TURNING:
+        raise InputError(f"turns by {np.degrees(abs(strand.turnings[worst])):.0f} degrees between two joints: one "
+                         "corner can't follow that; add joints", field=field)
+    shift = np.zeros(len(strand.joints))
+    if not spans.proper(shift).all():
+        shift = _least_shift(spans, len(shift))
+    angles = strand.angles + shift
+    following = np.append(angles[1:], angles[0] + strand.curve.lap_turning)[: strand.n_spans]
+    lengths, exact = spans.half_lengths(shift)
+    return StraightStrand(strand, angles, lengths, following - angles[: strand.n_spans], exact)
 
 
 @dataclass(frozen=True)
-class StraightNetwork:
-    """parameters (nq,) q; is_length (nq,) bool; groups: the elements; rods: one a curve."""
+class _Spans:
+    """Chords of a strand's spans and the angles that the tangents make with them.
 
-    parameters: np.ndarray
-    is_length: np.ndarray
-    groups: list[ElementGroup]
-    rods: list[StraightRod]
+    chords (m,) ; first, second (m,) : from chord to tangent at the first joint, from tangent to chord at the second,
+    both positive where the span bends to the right; start, end (m,) : places of its joints in the strand
+    """
 
+    chords: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+    start: np.ndarray
+    end: np.ndarray
 
-def straighten(network: CurveNetwork, free_ends: bool) -> StraightNetwork:
-    """Straight pieces and corners for a network; with free ends, rods go on to the ends of their curves."""
-    values: list[float] = []
-    is_length: list[bool] = []
-    full: list[tuple[int, int]] = []
-    ends: list[tuple[int]] = []
-    angular: list[tuple[int]] = []
-    rods = []
-    for run in network.runs:
-        geometry = [_corner(run, *span) for span in run.spans]
-        n = len(geometry)
-        first = len(values)
-        for l1, l2, *_ in geometry:
-            values += [l1, l2]
-        tips = _tips(run) if free_ends else (0.0, 0.0)
-        tip_numbers = []
-        for tip in tips:
-            tip_numbers.append(len(values) if tip > 0 else -1)
-            values += [tip] if tip > 0 else []
-        is_length += [True] * (len(values) - first)
-        corners = len(values) + np.arange(n)
-        values += [angle for _, _, angle, *_ in geometry]
-        is_length += [False] * n
-        before, after = first + 2 * np.arange(n), first + 2 * np.arange(n) + 1
-        for k in range(1, n):
-            full.append((after[k - 1], before[k]))
-        if run.curve.closed:
-            full.append((after[-1], before[0]))
-        else:
-            for tip, inner in zip(tip_numbers, (before[0], after[-1])):
-                (full if tip >= 0 else ends).append((tip, inner) if tip >= 0 else (inner,))
-        angular += [(k,) for k in corners]
-        rods.append(StraightRod(run, before, after, corners, tuple(tip_numbers),
-                                np.array([g[3] for g in geometry]), np.array([g[4] for g in geometry])))
-    groups = [ElementGroup("linear", np.array(rows, int)) for rows in (full, ends) if rows]
-    groups.append(ElementGroup("angular", np.array(angular, int)))
-    return StraightNetwork(np.array(values), np.array(is_length), groups, rods)
+    @classmethod
+    def of(cls, strand: Strand, joints: np.ndarray) -> _Spans:
+        m, n = strand.n_spans, len(strand.joints)
+        start = np.arange(m)
+        end = (start + 1) % n
+        chord = joints[strand.joints[end]] - joints[strand.joints[start]]
+        direction = np.arctan2(chord[:, 1], chord[:, 0])
+        first = _wrapped(strand.angles[start] - direction)
+        return cls(np.hypot(*chord.T), first, -strand.turnings - first, start, end)
+
+    def moved(self, shift: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Both angles after turning the lines at the joints by shift (J,)."""
+        return self.first + shift[self.start], self.second - shift[self.end]
+
+    def proper(self, shift: np.ndarray) -> np.ndarray:
+        """Whether each corner lies well between its joints (straight spans included)."""
+        a, b = self.moved(shift)
+        small, large = np.minimum(np.abs(a), np.abs(b)), np.maximum(np.abs(a), np.abs(b))
+        return (large < _FLAT) | ((a * b > 0) & (small >= (1 - 1e-6) * _LEAST_RATIO * large) & (small + large < np.pi))
+
+    def half_lengths(self, shift: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Half-pieces (m, 2) by the law of sines, the chord's halves where there is no proper corner; and where."""
+        a, b = self.moved(shift)
+        exact = self.proper(shift)
+        bent = exact & (np.maximum(np.abs(a), np.abs(b)) >= _FLAT)
+        whole = np.where(bent, np.sin(a + b), 1.0)
+        shares = np.where(bent, np.stack([np.sin(b), np.sin(a)]) / whole, 0.5)
+        return (self.chords * shares).T, exact
 
 
-def _corner(run: Run, j0: int, j1: int, u0: float, u1: float) -> tuple[float, float, float, float, np.ndarray]:
-    """(length before, length after, corner angle, heading before, corner point) of one span."""
-    curve = run.curve
-    p, q = curve.position(u0), curve.position(u1)
-    heading = curve.heading(u0)
-    turning = curve.turning(u0, u1)
-    t0 = np.array([np.cos(heading), np.sin(heading)])
-    t1 = np.array([np.cos(heading + turning), np.sin(heading + turning)])
-    chord = float(np.linalg.norm(q - p))
-    determinant = t0[0] * t1[1] - t0[1] * t1[0]
-    if abs(determinant) > 1e-6:
-        d = q - p
-        l1 = float(d[0] * t1[1] - d[1] * t1[0]) / determinant
-        l2 = float(t0[0] * d[1] - t0[1] * d[0]) / determinant
-        if min(l1, l2) >= _SHORTEST * chord and l1 + l2 <= 2 * chord:
-            return l1, l2, turning, heading, p + l1 * t0
-    return chord / 2, chord / 2, turning, heading, 0.5 * (p + q)
+def _least_shift(spans: _Spans, n_joints: int) -> np.ndarray:
+    """The smallest change (n_joints,) of the lines' directions that makes all corners proper; zero where none does.
+
+    With the side sigma that each span is to bend to: sigma a >= r sigma b and sigma b >= r sigma a, linear in the
+    shifts; least-distance programming by non-negative least squares (Lawson and Hanson, ch. 23).
+    """
+    from scipy.optimize import nnls
+
+    a, b, side = spans.first, spans.second, _sides(spans, n_joints)
+    rows, bounds = [], []
+    ratio = 1.5 * _LEAST_RATIO  # what is changed at all is moved clear of the limit
+    for k, (start, end) in enumerate(zip(spans.start, spans.end)):
+        for of_first, of_second in ((1.0, -ratio), (-ratio, 1.0)):
+            row = np.zeros(n_joints)
+            row[start] += side[k] * of_first
+            row[end] -= side[k] * of_second
+            rows.append(row)
+            bounds.append(-side[k] * (of_first * a[k] + of_second * b[k]))
+    E = np.vstack([np.array(rows).T, bounds])
+    target = np.append(np.zeros(n_joints), 1.0)
+    u, _ = nnls(E, target)
+    r = E @ u - target
+    if abs(r[-1]) < 1e-10:
+        return np.zeros(n_joints)
+    shift = -r[:-1] / r[-1]
+    return shift if np.abs(shift).max() <= _MOST_SHIFT else np.zeros(n_joints)
 
 
-def _tips(run: Run) -> tuple[float, float]:
-    """Arc lengths beyond the outermost joints; zero where a curve ends at its joint."""
-    if run.curve.closed:
-        return 0.0, 0.0
-    start, end = run.curve.length(0.0, run.parameters[0]), run.curve.length(run.parameters[-1], run.curve.end)
-    least = 1e-6 * run.curve.length(0.0, run.curve.end)
-    return tuple(0.0 if tip < least else tip for tip in (start, end))
+def _sides(spans: _Spans, n_joints: int) -> np.ndarray:
+    """The side (m,), 1 right or -1 left, that each span is to bend to.
+
+    The chords turn at every joint, and one of the two spans there must bend to the inside of that turn for the line
+    through the joint to pass outside. Of all choices that do, the one nearest to the tangents: dynamic programming
+    along the strand.
+    """
+    sides = (1.0, -1.0)
+    misfit = np.array([[_misfit(side * a, side * b) for side in sides] for a, b in zip(spans.first, spans.second)])
+    m = len(misfit)
+    closed = m == n_joints
+
+    def barred(k: int) -> np.ndarray:
+        """Cost (2, 2) of the sides of spans k - 1 and k: high where neither suits the chords' turn between them."""
+        turn = np.sign(spans.first[k] + spans.second[k - 1])
+        return 1e3 * abs(spans.first[k] + spans.second[k - 1]) * np.array(
+            [[turn not in (one, other) for other in sides] for one in sides])
+
+    best_total, best_path = np.inf, np.zeros(m, int)
+    for first in ((0, 1) if closed else (None,)):
+        cost = misfit[0] + (0.0 if first is None else np.where(np.arange(2) == first, 0.0, np.inf))
+        back = []
+        for k in range(1, m):
+            step = cost[:, None] + barred(k)
+            back.append(step.argmin(axis=0))
+            cost = step.min(axis=0) + misfit[k]
+        if closed:
+            cost = cost + barred(0)[:, first]
+        path = [int(cost.argmin())]
+        for choice in reversed(back):
+            path.append(int(choice[path[-1]]))
+        if cost.min() < best_total:
+            best_total, best_path = cost.min(), np.array(path[::-1])
+    return np.array(sides)[best_path]
+
+
+def _misfit(a: float, b: float) -> float:
+    """How far tangents at angles a, b are from a proper corner on the positive side, squared."""
+    return max(0.0, _LEAST_RATIO * b - a) ** 2 + max(0.0, _LEAST_RATIO * a - b) ** 2
+
+
+def _wrapped(angle: np.ndarray) -> np.ndarray:
+    """The angle in (-pi, pi]."""
+    return np.pi - np.mod(np.pi - angle, 2 * np.pi)
