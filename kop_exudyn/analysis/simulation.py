@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..equilibrium.exudyn_model import Confirmation, ExudynModel
-from ..equilibrium.newton import Equilibrium
+from ..equilibrium.newton import Equilibrium, refine
 from ..equilibrium.warm_up import warm_up
 from ..errors import SimulationFailure
 from ..optimize.fitting import FitResult, TargetFitting
@@ -67,7 +67,8 @@ def simulate(design: Design) -> SimulationResult:
         target = design.target
         confirmations = {}
         for name, equilibrium in equilibria.items():
-            confirmations[name] = ExudynModel(design.scene(name)).confirm(equilibrium)
+            equilibria[name] = refine(design.systems[name], equilibrium)
+            confirmations[name] = ExudynModel(design.scene(name)).confirm(equilibria[name])
     except SimulationFailure as failure:
         raise failure.within(design.name) from None
     role = design.fitted_role.name

@@ -173,7 +173,7 @@ class _Run:
                     self.system.predicted_stress[:] = self.system.stress()
                     converged = self._mixed()
             energy = self.system.assemble(self.state)
-            residual, _ = self._residual()
+            residual, _ = self.residual()
             negative = self.system.factorise()
             border = border_of(self.system)
             if is_convex(negative, border):
@@ -185,7 +185,7 @@ class _Run:
         return Equilibrium(
             state=self.state, q=np.array(self.q, float), opening=self.opening,
             torque=self.torque, stress=self.system.stress(), elastic_energy=energy.elastic, potential=energy.potential,
-            iterations=self.iterations, residual=self._relative(residual), escapes=self.escapes,
+            iterations=self.iterations, residual=self.relative(residual), escapes=self.escapes,
             wall_s=perf_counter() - begin,
         )
 
@@ -202,7 +202,7 @@ class _Run:
         cap, floor, since, returns = options.rotation_cap, 0.0, 0, 0
         while True:
             energy = system.assemble(self.state, mixed=True)
-            residual, gap = self._residual()
+            residual, gap = self.residual()
             if self._converged(residual, gap):
                 return True
             merit, value = self._merit(residual, gap), energy.potential + self.torque * gap
@@ -249,12 +249,12 @@ class _Run:
         energy = system.assemble(self.state)
         shift = 0.0
         for _ in range(limit):
-            residual, gap = self._residual()
+            residual, gap = self.residual()
             shift, border = factorise_convex(system, shift)
             if border is not None:
                 # the multiplier that fits the energy's gradient best: after the gap is closed only it is unknown
                 self.torque = -float(system.gradient[: system.n_unknowns] @ border.column) / border.schur
-                residual, gap = self._residual()
+                residual, gap = self.residual()
             if self._converged(residual, gap):
                 return True
             self._check_budget()
@@ -270,7 +270,7 @@ class _Run:
             self.state = self.state.moved(system.increment(scale * step))
             shift = 0.0 if scale >= 0.5 else shift
             energy = system.assemble(self.state)
-        return self._converged(*self._residual())
+        return self._converged(*self.residual())
 
     def _line_search(self, step: np.ndarray, scale: float, slope: float, energy: Energy) -> float:
         """Backtracking on the potential (on the residual where no potential exists); 0 when nothing was gained."""
@@ -328,7 +328,7 @@ class _Run:
         return best, change
 
     # -- measures --------------------------------------------------------------------------------------------------
-    def _residual(self) -> tuple[np.ndarray, float]:
+    def residual(self) -> tuple[np.ndarray, float]:
         """Residual (n_free,) of the state assembled last, and how far its mean angle is from the opening."""
         system = self.system
         residual = system.gradient[: system.n_unknowns]
@@ -349,7 +349,7 @@ class _Run:
         allowed = self.options.tolerance * force + 40 * noise
         return max(self._largest(residual) / allowed, abs(gap) / 1e-11)
 
-    def _relative(self, residual: np.ndarray) -> float:
+    def relative(self, residual: np.ndarray) -> float:
         force, noise = self.system.force_scale()
         return self._largest(residual) / max(force, noise, np.finfo(float).tiny)
 
@@ -373,3 +373,29 @@ class _Run:
         if self.iterations >= self.options.max_iterations:
             raise SimulationFailure(f"no equilibrium within {self.options.max_iterations} Newton iterations")
         self.iterations += 1
+
+
+def refine(system: System, equilibrium: Equilibrium, steps: int = 3) -> Equilibrium:
+    """The same equilibrium converged to round-off: plain Newton steps as long as they lower the residual.
+
+    For states that are kept: Exudyn's Jacobian leaves part of the joints' stiffness out, so that near a bifurcation it
+    contracts slowly, and what it starts with is what it ends with.
+    """
+    run = _Run(system, equilibrium.q, equilibrium.start, equilibrium.opening, NewtonOptions())
+    system.set_parameters(equilibrium.q)
+    energy = system.assemble(run.state)
+    residual, gap = run.residual()
+    best = (run.state, run.torque, energy, system.stress(), run.relative(residual))
+    for _ in range(steps):
+        system.factorise()
+        step, change = bordered_solve(system, border_of(system), -residual, -gap)
+        run.state = run.state.moved(system.increment(step))
+        run.torque += float(change)
+        energy = system.assemble(run.state)
+        residual, gap = run.residual()
+        if not run.relative(residual) < best[4]:
+            break
+        best = (run.state, run.torque, energy, system.stress(), run.relative(residual))
+    state, torque, energy, stress, relative = best
+    return replace(equilibrium, state=state, torque=torque, stress=stress, elastic_energy=energy.elastic,
+                   potential=energy.potential, residual=relative)

@@ -14,7 +14,7 @@ from typing import Mapping
 import numpy as np
 
 from ..equilibrium.exudyn_model import Confirmation, ExudynModel
-from ..equilibrium.newton import Equilibrium, NewtonOptions, Start, solve
+from ..equilibrium.newton import Equilibrium, NewtonOptions, Start, refine, solve
 from ..equilibrium.sensitivities import Sensitivities
 from ..errors import SimulationFailure
 from ..structures.base import Design, Target
@@ -146,11 +146,12 @@ class DesignObjective:
         for role in self.design.roles:
             if role.name not in self._models:
                 self._models[role.name] = ExudynModel(self.design.scene(role.name))
+            refined = refine(self.design.systems[role.name], evaluation.equilibria[role.name])
             try:
-                confirmations[role.name] = self._models[role.name].confirm(evaluation.equilibria[role.name])
+                confirmations[role.name] = self._models[role.name].confirm(refined)
             except SimulationFailure as failure:
                 raise failure.within(f"{self.design.name}: {role.name} state") from None
-            equilibria[role.name] = replace(evaluation.equilibria[role.name], state=confirmations[role.name].state)
+            equilibria[role.name] = replace(refined, state=confirmations[role.name].state)
         return replace(evaluation, equilibria=equilibria, confirmations=confirmations)
 
     def follow(self, q: np.ndarray, previous: Evaluation, steps: int) -> list[Evaluation]:

@@ -1,7 +1,7 @@
 """The two optimisation problems: over all elements, drawn to the kit (relaxed), and over the kit alone (assigned)."""
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,7 +19,8 @@ from .problem import Derivatives, LiftedTerm, Point
 class DatasetPoint:
     """What the problems keep with a point.
 
-    evaluations : of all designs; replaced by Exudyn's once the point is accepted
+    evaluations : of all designs; replaced by Exudyn's once derivatives are taken there
+    solved : of all designs, as they were found first: a resumed run confirms and goes on from the same states
     kit, assignment : nearest to the point (relaxed), or that the point is made of (assigned)
     terms : the objective's terms by name, summed over designs
     """
@@ -28,6 +29,10 @@ class DatasetPoint:
     kit: Kit
     assignment: Assignment
     terms: dict[str, float]
+    solved: list[Evaluation] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.solved = self.evaluations
 
 
 class RelaxedProblem:

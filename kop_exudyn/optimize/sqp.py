@@ -128,8 +128,8 @@ class _Run:
 
     def solve(self, x0: np.ndarray, state: SQPState | None, start: Point | None) -> SQPResult:
         state, point = self._begin(x0, state, start)
+        derivatives = self._timed("derivatives", self.problem.derivatives, point)
         while True:
-            derivatives = self._timed("derivatives", self.problem.derivatives, point)
             norm, state = self._stationarity(point, derivatives, state)
             if norm <= self.options.gradient_tolerance * max(state.gradient_scale, abs(point.value)):
                 return self._result(state, point, True, "converged: the projected gradient met its tolerance")
@@ -143,7 +143,7 @@ class _Run:
             outcome = self._step(point, model, state, norm)
             if isinstance(outcome, SQPResult):
                 return outcome
-            state, point = outcome
+            state, point, derivatives = outcome
             if self.observer is not None:
                 self.observer(state.history[-1])
             if self.checkpoint is not None:
@@ -213,15 +213,19 @@ class _Run:
             x = np.clip(point.x + self.region.scale * step.u, self.region.lower, self.region.upper)
             try:
                 trial = self._timed("evaluate", self.problem.evaluate, x, point)
+                actual = point.value - trial.value
+                accepted = actual >= self.options.accept * step.predicted  # false for NaN
+                # a point without derivatives can't be gone on from: it counts as failed
+                derivatives = self._timed("derivatives", self.problem.derivatives, trial) if accepted else None
             except SimulationFailure as failure:
                 failures, last = failures + 1, str(failure)
                 radius = 0.25 * min(step.length, radius)
                 _log.info("step %d: trial %d failed: %s", state.step + 1, trials, failure)
                 continue
-            actual = point.value - trial.value
-            if actual >= self.options.accept * step.predicted:  # false for NaN
+            if accepted:
                 state = self._count(state, trials, failures)
-                return self._accept(state, trial, model, step, radius, norm, actual, trials, failures), trial
+                state = self._accept(state, trial, model, step, radius, norm, actual, trials, failures)
+                return state, trial, derivatives
             radius = _shrunk(model, step, actual) * min(step.length, radius)
         return self._stuck(self._count(state, trials, failures), point, trials, failures, last)
 

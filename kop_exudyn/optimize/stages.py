@@ -235,7 +235,7 @@ class Stages:
             self.observer(StageEvent(name, state.history[-1], point.data.terms, weight))
             self.store.save(name, {
                 **{f"sqp/{k}": v for k, v in state.to_arrays().items()},
-                **{f"states/{k}": v for k, v in evaluations_to_arrays(point.data.evaluations).items()},
+                **{f"states/{k}": v for k, v in evaluations_to_arrays(point.data.solved).items()},
                 "kit": point.data.kit.vector, "terms": np.array(terms),
                 "tally": np.array([tally.equilibria - before[0], tally.newton_iterations - before[1]]),
             })
