@@ -33,12 +33,10 @@ if tuple(int(part) for part in exu.__version__.split(".")[:3]) < _TESTED:
         f"kop_exudyn needs exudyn >= 1.13.6, found {exu.__version__}: older releases take the rod's stress-free "
         "state from other data than the reference coordinates, and would give wrong equilibria")
 
-# Multiple of the round-off in the rods' forces, eps size EA / L: below it, a re-solve of a solution could not converge.
+# Residual, relative to the largest internal force, at which Exudyn's solution is accepted.
+_TOLERANCE = 1e-9
+# And as a multiple of the round-off in the rods' forces, eps size EA / L: below it no solution could converge.
 _ROUND_OFF = 200.0
-# Relative to the first residual, which is that of all reactions missing (Exudyn's static Newton starts its multipliers
-# at zero). Its joints leave their geometric stiffness out of the Jacobian, so that close to a bifurcation the residual
-# stalls near 1e-7 of the forces; elsewhere the first step reaches 1e-10.
-_RELATIVE_TOLERANCE = 1e-6
 _MAX_STEPS = 4
 # A solution further away than this, relative to the size, is another equilibrium and confirms nothing.
 _MAX_MOVE = 1e-6
@@ -50,7 +48,7 @@ class Confirmation:
 
     version : Exudyn's version
     newton_steps : steps that it took from the given state
-    residual : its final residual relative to the largest internal force
+    residual : norm of its final residual relative to the largest internal force
     moved : largest displacement of a body, relative to the scene's size
     wall_s : seconds, model update and solve
     state : Exudyn's solution
@@ -78,7 +76,7 @@ class ExudynModel:
         self._container = exu.SystemContainer()
         self._mbs = self._container.AddSystem()
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)
+            _accept_rotation_markers()
             self._add_nodes_and_beams()
             self._add_joints()
             self._add_pins()
@@ -87,7 +85,7 @@ class ExudynModel:
         self._settings = self._solver_settings()
 
     def confirm(self, equilibrium: Equilibrium) -> Confirmation:
-        """Solve with Exudyn, starting from the equilibrium.
+        """Solve with Exudyn, starting from the equilibrium: Newton steps of its static solver, its residual at the end.
 
         Raises SimulationFailure when Exudyn's static solver doesn't converge from there, or to another state.
         """
@@ -95,29 +93,53 @@ class ExudynModel:
         scene = self.scene
         lengths = scene.rest_lengths(equilibrium.q)
         reference = self.layout.reference_coordinates(scene, lengths)
-        self._set_parameters(equilibrium, lengths, reference)
+        with warnings.catch_warnings():
+            _accept_rotation_markers()
+            self._set_parameters(equilibrium, lengths, reference)
+        force = np.abs(equilibrium.stress) / np.array([1, 1, 1] + 3 * [scene.length_scale])
+        force = max(float(force.max()), self._tiny)
+        allowed = max(_TOLERANCE * force, _ROUND_OFF * self._tiny)
         total = self._coordinates(equilibrium.state)
-        self._mbs.systemData.SetODE2Coordinates((total - reference).ravel(),
-                                                configuration=exu.ConfigurationType.Initial)
-        self._mbs.systemData.SetAECoordinates(np.zeros(self._mbs.systemData.AEsize()),
-                                              configuration=exu.ConfigurationType.Initial)
-        solver = exu.MainSolverStatic()
+        for step in range(1, _MAX_STEPS + 1):
+            total, reactions = self._newton_step(total, reference)
+            state = self._state(total, equilibrium.state)
+            moved = np.abs(state.positions - equilibrium.state.positions).max() / scene.size
+            if not moved < _MAX_MOVE:
+                raise SimulationFailure(f"Exudyn's static solver moved the state by {moved:.2e} of the size")
+            residual = self._residual(total - reference, reactions)
+            if residual <= allowed:
+                return Confirmation(exu.__version__, step, residual / force, float(moved), perf_counter() - begin, state)
+        raise SimulationFailure(f"Exudyn's static solver did not confirm the state within {_MAX_STEPS} Newton steps "
+                                f"(residual {residual / force:.2e} of the largest force)")
+
+    def _newton_step(self, total: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """One step of Exudyn's static solver: total coordinates (n_nodes, 6) and the joints' reactions.
+
+        The nodes' rotational increments are body-frame ones, exp(hat(phi)) exp(hat(w)); Exudyn's Lie-group integrators
+        compose them so, its static solver adds them to phi. Where rotations from the global axes are large that spoils
+        the convergence, so single steps are taken and composed here.
+        """
+        data, initial = self._mbs.systemData, exu.ConfigurationType.Initial
+        data.SetODE2Coordinates((total - reference).ravel(), configuration=initial)
+        data.SetAECoordinates(np.zeros(data.AEsize()), configuration=initial)
         try:
-            success = solver.SolveSystem(self._mbs, self._settings)
+            exu.MainSolverStatic().SolveSystem(self._mbs, self._settings)
         except Exception as error:  # Exudyn raises its own types, some of them plain RuntimeErrors
             raise SimulationFailure(f"Exudyn's static solver failed: {str(error).splitlines()[0][:120]}") from None
-        if not success:
-            raise SimulationFailure(f"Exudyn's static solver did not confirm the state within {_MAX_STEPS} Newton "
-                                    f"steps (residual {solver.conv.residual:.2e})")
-        solution = self._mbs.systemData.GetODE2Coordinates().reshape(-1, 6) + reference
-        state = self._state(solution, equilibrium.state)
-        moved = np.abs(state.positions - equilibrium.state.positions).max() / scene.size
-        if not moved < _MAX_MOVE:
-            raise SimulationFailure(f"Exudyn's static solver moved the state by {moved:.2e} of the size")
-        force = np.abs(equilibrium.stress) / np.array([1, 1, 1] + 3 * [scene.length_scale])
-        return Confirmation(
-            exu.__version__, int(solver.it.newtonSteps), float(solver.conv.residual / max(force.max(), self._tiny)),
-            float(moved), perf_counter() - begin, state)
+        increment = data.GetODE2Coordinates().reshape(-1, 6) - (total - reference)
+        if not np.isfinite(increment).all():
+            raise SimulationFailure("Exudyn's static solver found no finite step")
+        turned = exp_so3(total[:, 3:]) @ exp_so3(increment[:, 3:])
+        return np.concatenate([total[:, :3] + increment[:, :3], log_so3(turned)], axis=1), data.GetAECoordinates()
+
+    def _residual(self, coordinates: np.ndarray, reactions: np.ndarray) -> float:
+        """Norm of Exudyn's residual, equations of equilibrium and of joints, at coordinates (n_nodes, 6)."""
+        solver, data = exu.MainSolverStatic(), self._mbs.systemData
+        solver.InitializeSolver(self._mbs, self._settings)
+        data.SetODE2Coordinates(coordinates.ravel())
+        data.SetAECoordinates(reactions)
+        solver.ComputeNewtonResidual(self._mbs, self._settings)
+        return float(np.linalg.norm(solver.GetSystemResidual()))
 
     # -- model -----------------------------------------------------------------------------------------------------
     def _add_nodes_and_beams(self) -> None:
@@ -208,6 +230,8 @@ class ExudynModel:
             hub = layout.carriers[body, -1]
             self._wrenches.append((body, hub, self._load(item.LoadForceVector, hub.node),
                                    self._load(item.LoadTorqueVector, hub.node, bodyFixed=True)))
+        self._springs = [(term, [self._spring(int(a), int(b)) for a, b in term.pairs])
+                         for term in scene.terms if hasattr(term, "pairs")]
         self._hinge_wrenches = []
         for hinge in sorted({int(d) - 6 * scene.n_bodies for term in scene.terms for d in np.unique(term.dofs)
                              if 6 * scene.n_bodies <= d < scene.n_dofs}):
@@ -216,6 +240,17 @@ class ExudynModel:
             for owner, sign in ((hub, -1.0), (carrier, 1.0)):
                 load = self._load(item.LoadTorqueVector, owner.node, bodyFixed=True)
                 self._hinge_wrenches.append((hinge, load, sign * owner.frame.T[:, 2]))
+
+    def _spring(self, first: int, second: int) -> tuple[object, int, int]:
+        """A connector between two bodies that lends Exudyn's Jacobian the stiffness of what acts between them.
+
+        It is unstressed at the equilibrium: the forces themselves are loads. Without it the rods alone would have to
+        hold a mesh together that its actuators hold.
+        """
+        hubs = [self.layout.carriers[body, -1] for body in (first, second)]
+        connector = self._mbs.AddObject(item.ObjectConnectorRigidBodySpringDamper(
+            markerNumbers=[self._marker(hub.node) for hub in hubs], rotationMarker0=hubs[0].frame.T))
+        return connector, first, second
 
     def _load(self, kind: type, node: int, **options: object) -> object:
         return self._mbs.AddLoad(kind(markerNumber=self._marker(node), loadVector=[0, 0, 0], **options))
@@ -231,11 +266,10 @@ class ExudynModel:
         static.verboseMode = 0
         static.numberOfLoadSteps = 1
         static.adaptiveStep = False
-        static.newton.maxIterations = _MAX_STEPS
-        static.newton.relativeTolerance = _RELATIVE_TOLERANCE
+        static.newton.maxIterations = 1  # see _newton_step
         scene = self.scene
         self._tiny = float(np.finfo(float).eps * scene.size * scene.stiffness[:, 0].max() / scene.length_scale)
-        static.newton.absoluteTolerance = _ROUND_OFF * self._tiny
+        static.newton.relativeTolerance = static.newton.absoluteTolerance = np.finfo(float).tiny
         settings.solution.file.write = False
         settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
         settings.linearSolver.reuseAnalyzedPattern = True
@@ -274,14 +308,32 @@ class ExudynModel:
         scene = self.scene
         total = np.zeros(scene.n_dofs + 1)
         for term in scene.terms:
-            _, g, _ = term.gradient_hessian(state)
+            _, g, H = term.gradient_hessian(state)
             np.subtract.at(total, term.dofs, g)
+            for springs in (springs for owner, springs in self._springs if owner is term):
+                self._set_springs(springs, H, state)
         for body, hub, force, torque in self._wrenches:
             part = total[6 * body: 6 * body + 6]
             self._mbs.SetLoadParameter(force, "loadVector", part[:3].tolist())
             self._mbs.SetLoadParameter(torque, "loadVector", (hub.frame.T @ part[3:]).tolist())
         for hinge, load, axis in self._hinge_wrenches:
             self._mbs.SetLoadParameter(load, "loadVector", (total[6 * scene.n_bodies + hinge] * axis).tolist())
+
+    def _set_springs(self, springs: list[tuple[object, int, int]], hessians: np.ndarray, state: State) -> None:
+        """Connectors' stiffness from the second derivatives (m, 12, 12) of what acts between the two bodies.
+
+        Seen from the first body's axes, the second one moves by R_0 dx and turns by R_0 theta.
+        """
+        for (connector, first, second), H in zip(springs, hessians):
+            R0, R1 = state.rotations[first], state.rotations[second]
+            change = np.zeros((6, 6))
+            change[:3, :3], change[3:, 3:] = R0, R1.T @ R0
+            offset = np.zeros(6)
+            offset[:3] = R0.T @ (state.positions[second] - state.positions[first])
+            frame = self.layout.carriers[second, -1].frame
+            self._mbs.SetObjectParameter(connector, "stiffness", change.T @ H[6:, 6:] @ change)
+            self._mbs.SetObjectParameter(connector, "offset", offset.tolist())
+            self._mbs.SetObjectParameter(connector, "rotationMarker1", frame.T @ R1.T @ R0)
 
     def _coordinates(self, state: State) -> np.ndarray:
         """Total coordinates (n_nodes, 6) of Exudyn's nodes at a state."""
@@ -311,3 +363,8 @@ class ExudynModel:
                 measured = np.arctan2(turn[1, 0], turn[0, 0])
                 angles[hinge] += np.remainder(measured - near.angles[hinge] + np.pi, 2 * np.pi) - np.pi
         return State(positions, rotations, angles)
+
+
+def _accept_rotation_markers() -> None:
+    """Let joints and connectors be given the rotation of their markers, which 1.12.244 and later advise against."""
+    warnings.simplefilter("ignore", DeprecationWarning)

@@ -45,6 +45,11 @@ class LinearActuators:
         six = np.arange(6)
         self.dofs = np.concatenate([6 * self.top[:, None] + six, 6 * self.bottom[:, None] + six], axis=1)
 
+    @property
+    def pairs(self) -> np.ndarray:
+        """(m, 2) the bodies that each actuator joins, in the order of its unknowns."""
+        return np.stack([self.top, self.bottom], axis=1)
+
     def weighted(self, weight: Any) -> LinearActuators:
         """The same actuators with other weights."""
         return LinearActuators(self.top, self.bottom, self.spacing, weight, alignment=self.alignment,

@@ -87,7 +87,7 @@ def test_plates_of_rods_are_nearly_rigid_bodies(design, deployed):
 
 def test_exudyn_confirms_the_final_state(design, deployed):
     confirmation = ExudynModel(design.scene()).confirm(deployed)
-    assert confirmation.moved < 1e-8 and confirmation.residual < 1e-5
+    assert confirmation.moved < 1e-8 and confirmation.residual < 1e-8
 
 
 def test_sensitivities_are_those_of_resolved_states(design, deployed):
