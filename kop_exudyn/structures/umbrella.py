@@ -30,8 +30,8 @@ class Deployment:
     """How an umbrella mesh is opened.
 
     weights : of the actuators, one solve after the other
-    attraction : weight that pulls X joints and cell midpoints towards their places meanwhile; in the final state it is 0
-    share : of the attraction, omega; the rest would pull towards the surface and is left out, being 1e-5 of it
+    attraction : weight that pulls X joints and cell midpoints to their places meanwhile; 0 in the final state
+    share : of the attraction, omega; the rest, 1e-5 of it, would pull towards the surface and is left out
     angle : rad, turn of all hinges in the compact state, so that it isn't the unstable equilibrium
     tolerance : relative residual of all solves but the last
     """
@@ -109,7 +109,8 @@ class Umbrella(Design):
         options, done = NewtonOptions(tolerance=self.deployment.tolerance), []
         start = self._model.compact(q, self.deployment.angle)
         for weight in self.deployment.weights:
-            system = System(scene.with_terms(self._model.actuators.weighted(weight * self._model.energy_scale), *attraction))
+            actuators = self._model.actuators.weighted(weight * self._model.energy_scale)
+            system = System(scene.with_terms(actuators, *attraction))
             start = self._solved(solve, system, q, start, options, f"actuator weight {weight:g}")
             done.append(start)
         final = self._solved(solve, self.systems["deployed"], q, start, NewtonOptions(), "final state")
@@ -145,7 +146,7 @@ class Umbrella(Design):
 
     @cached_property
     def target(self) -> Target:
-        """The mesh's target surface, or, where it has none, the one through the deployed X joints and cell midpoints."""
+        """The mesh's target surface, or, where it has none, the one through its deployed X joints and midpoints."""
         state = self.deployed.state
         positions = state.positions[self.joints]
         if self.mesh.target is not None:

@@ -64,7 +64,8 @@ class BaseMesh:
         self.inradius = self.edge / (2 * np.sqrt(3))
         self.inner, pairs = _inner_edges(self.faces)
         self.midpoints = self.vertices[self.inner].mean(axis=1)
-        kind = self._pointing() ^ flipped
+        self.flipped = bool(flipped)
+        kind = self._pointing() ^ self.flipped
         if (kind[pairs[:, 0]] == kind[pairs[:, 1]]).any():
             raise InputError("triangles don't belong to one lattice", field="base.faces")
         self.cells = np.where(kind[pairs[:, :1]], pairs[:, ::-1], pairs)
@@ -117,7 +118,8 @@ def umbrella_mesh(base: BaseMesh, lengths: Any, plates: Plates = Plates(),
     if lengths.shape != (n_cells, 2) or not (np.isfinite(lengths).all() and (lengths > 0).all()):
         raise InputError(f"expected {n_cells} pairs of positive lengths", field="lengths")
     if not plates.arm_position < base.edge / 2 or plates.thickness >= base.inradius:
-        raise InputError("arms must stand within the plate edges", field="plates.arm_position", value=plates.arm_position)
+        raise InputError("arms must stand within the plate edges", field="plates.arm_position",
+                         value=plates.arm_position)
     outline = _Outline(base, lengths, plates)
     return UmbrellaMesh(
         positions=outline.positions, frames=outline.frames, hinged=outline.hinged, rods=outline.rods(),
@@ -190,7 +192,8 @@ class _Outline:
             offsets = np.zeros((m, 2, 3))
             offsets[:, 1] = up * t / 2 * _UP
             normals = np.broadcast_to(up * _UP, (m, 3))
-            rods.append((joints, np.zeros((m, 2), bool), offsets, normals, self.cell, np.full(m, side), np.zeros(m, bool)))
+            none = np.zeros((m, 2), bool)
+            rods.append((joints, none, offsets, normals, self.cell, np.full(m, side), none[:, 0]))
         for side, up in ((TOP, 1.0), (BOTTOM, -1.0)):
             joints = np.stack([self.ports[:, side], self.crossings[self.edge]], axis=1)
             # an arm's lower end, in the edge's line; the X joint lies t/2 beyond it as the unflipped cell sees it

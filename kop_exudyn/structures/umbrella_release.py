@@ -170,7 +170,8 @@ class _Fields:
                 raise self.error(f"{field}[{k}]", f"unknown label (known: {', '.join(known)})", value)
         return np.array(values)
 
-    def array(self, field: str, shape: tuple[int | None, ...], kind: type = float, upper: int | None = None) -> np.ndarray:
+    def array(self, field: str, shape: tuple[int | None, ...], kind: type = float,
+              upper: int | None = None) -> np.ndarray:
         return self.values(self.data[field], shape, kind, field, upper)
 
     def values(self, given: Any, shape: tuple[int | None, ...], kind: type, field: str,

@@ -73,7 +73,8 @@ def umbrella_scene(mesh: UmbrellaMesh, model: UmbrellaModel = UmbrellaModel()) -
     to_joint = np.swapaxes(joint_axes, 2, 3)
     end_nodes = build.nodes(
         rods.joints.ravel(), np.where(rods.behind, hinge[rods.joints], -1).ravel(),
-        (to_joint @ frames[:, None]).reshape(-1, 3, 3), np.einsum("neij,nej->nei", to_joint, rods.offsets).reshape(-1, 3),
+        (to_joint @ frames[:, None]).reshape(-1, 3, 3),
+        np.einsum("neij,nej->nei", to_joint, rods.offsets).reshape(-1, 3),
     ).reshape(-1, 2)
     count = np.where(rods.arms, model.arm_elements, model.plate_elements)
     rod_of = np.repeat(np.arange(len(count)), count - 1)
