@@ -1,7 +1,7 @@
 """Triangle meshes as smooth surfaces: a chart of the mesh, and a cubic B-spline surface fitted to it.
 
-Curvatures of a mesh itself are defined only in the mean. The fit is a penalised tensor-product spline (P-splines: Eilers,
-Marx, Statistical Science 11(2), 1996), so that every formula for smooth surfaces applies; how far it lies from
+Curvatures of a mesh itself are defined only in the mean. The fit is a penalised tensor-product spline (P-splines:
+Eilers, Marx, Statistical Science 11(2), 1996), so that every formula for smooth surfaces applies; how far it lies from
 the mesh's vertices is measured, and limited.
 """
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 from scipy.interpolate import BSpline
+from scipy.sparse.linalg import spsolve
 
 from ..errors import InputError
 from ..scene.surface import TriangleSurface
@@ -45,8 +46,8 @@ class MeshSurface(Surface):
         flat = _conformal(self.mesh) if chart == "conformal" else self.mesh.vertices[:, _AXES[up][:2]]
         area = _signed_areas(flat, self.mesh.faces)
         if not ((area > 0).all() or (area < 0).all()):
-            raise InputError("the mesh folds over in this chart" + ("; try the conformal chart" if chart == "plane" else ""),
-                             field="surface.chart", value=chart)
+            hint = "; try the conformal chart" if chart == "plane" else ""
+            raise InputError("the mesh folds over in this chart" + hint, field="surface.chart", value=chart)
         self._flat = TriangleSurface(np.column_stack([flat, np.zeros(len(flat))]), self.mesh.faces)
         self.lower, self.upper = flat.min(axis=0), flat.max(axis=0)
         self._fit(flat)
@@ -95,7 +96,7 @@ class MeshSurface(Surface):
         bends = [sp.kron(_second_difference(n), sp.eye(m)), sp.kron(sp.eye(n), _second_difference(m))]
         weight = _PENALTY * len(flat) / (n * m)
         matrix = rows.T @ rows + weight * sum(bend.T @ bend for bend in bends)
-        solution = sp.linalg.spsolve(sp.csc_array(matrix), rows.T @ self.mesh.vertices)
+        solution = spsolve(sp.csc_array(matrix), rows.T @ self.mesh.vertices)
         self._coefficients = np.asarray(solution).reshape(n, m, 3)
         if not self.deviation <= _MAX_DEVIATION * self.mesh.diagonal:
             raise InputError(f"the mesh is too rough to be followed by a smooth surface (off by "

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from .surfaces import Surface
 
-_RELATIVE, _ABSOLUTE = 1e-10, 1e-12
+_RELATIVE, _ABSOLUTE = 1e-9, 1e-11
 _LONGEST = 4.0  # times the domain's size: a curve that still winds on then is cut off
 # Where the surface is that close to flat or umbilic, a field of asymptotic or principal directions has no meaning.
 _DIRECTIONLESS = 1e-6
@@ -50,7 +50,7 @@ def geodesic(domain: Domain, point: Any, angle: float, samples: int = 60) -> np.
     start = frame @ np.array([np.cos(angle), np.sin(angle)])
 
     def slope(_: float, y: np.ndarray) -> np.ndarray:
-        gamma = domain.surface.at(y[None, :2]).christoffel[0]
+        gamma = domain.surface.local(y[None, :2]).christoffel[0]
         return np.concatenate([y[2:], -np.einsum("kab,a,b->k", gamma, y[2:], y[2:])])
 
     return _both_ways(domain, slope, np.concatenate([point, start]), np.concatenate([point, -start]), samples)
@@ -63,7 +63,7 @@ def asymptotic_line(domain: Domain, point: Any, family: int, samples: int = 60) 
     Raises InputError where the surface has no asymptotic directions.
     """
     def direction(uv: np.ndarray) -> np.ndarray | None:
-        values, vectors = domain.surface.at(uv[None]).principal()
+        values, vectors = domain.surface.local(uv[None]).principal()
         low, high = values[0]
         if not low < -_DIRECTIONLESS * high or not high > -_DIRECTIONLESS * low:
             return None
@@ -78,12 +78,13 @@ def asymptotic_line(domain: Domain, point: Any, family: int, samples: int = 60) 
 
 
 def curvature_line(domain: Domain, point: Any, family: int, samples: int = 60) -> np.ndarray:
-    """Parameters (n, 2) along a curvature line through a point, both ways; family 0: the lower curvature, 1: the higher.
+    """Parameters (n, 2) along a curvature line through a point, both ways.
 
+    family : 0 for the lower principal curvature, 1 for the higher one
     Raises InputError at umbilic points, where no direction is principal.
     """
     def direction(uv: np.ndarray) -> np.ndarray | None:
-        values, vectors = domain.surface.at(uv[None]).principal()
+        values, vectors = domain.surface.local(uv[None]).principal()
         return None if np.ptp(values[0]) <= _DIRECTIONLESS * np.abs(values[0]).max() else vectors[0][:, family]
 
     return _field_line(domain, direction, point, samples, "an umbilic point has no principal directions")
@@ -104,7 +105,7 @@ def _field_line(domain: Domain, direction: Callable[[np.ndarray], np.ndarray | N
             here = direction(y)
             if here is None:
                 raise _Lost
-            metric = domain.surface.at(y[None]).metric[0]
+            metric = domain.surface.local(y[None]).metric[0]
             here = here if here @ metric @ last[0] > 0 else -here
             last[0] = here
             return here
@@ -150,7 +151,7 @@ def _until_outside(domain: Domain, slope: Callable, start: np.ndarray) -> _Path:
 
     longest, path = _LONGEST * domain.size, _Path(start, [], [])
     try:
-        solver = DOP853(slope, 0.0, start, longest, max_step=domain.size / 40, rtol=_RELATIVE, atol=_ABSOLUTE)
+        solver = DOP853(slope, 0.0, start, longest, max_step=domain.size / 20, rtol=_RELATIVE, atol=_ABSOLUTE)
         while solver.status == "running":
             solver.step()
             if solver.status == "failed":
@@ -161,7 +162,7 @@ def _until_outside(domain: Domain, slope: Callable, start: np.ndarray) -> _Path:
             path.ends.append(_border(domain, step, solver.t_old, solver.t) if outside else solver.t)
             if outside:
                 break
-    except (_Lost, InputError):  # no direction, or a stage of a step beyond the surface's border
+    except (_Lost, np.linalg.LinAlgError):  # no direction, or a stage of a step at a singular point
         pass
     return path
 

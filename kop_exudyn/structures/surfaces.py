@@ -110,6 +110,10 @@ class Surface(ABC):
         """(n, 3) points at parameters (n, 2)."""
         return self.derivatives(uv)[0]
 
+    def local(self, uv: np.ndarray) -> LocalGeometry:
+        """`at` without its checks, for inner loops: values that aren't finite where the surface is singular."""
+        return LocalGeometry(*self.derivatives(uv))
+
     def at(self, uv: np.ndarray) -> LocalGeometry:
         """The local geometry at parameters (n, 2).
 
@@ -119,7 +123,7 @@ class Surface(ABC):
         inside = self.contains(uv)
         if not inside.all():
             raise InputError("lies outside the surface", field="network", value=uv[int(np.argmin(inside))].tolist())
-        local = LocalGeometry(*self.derivatives(uv))
+        local = self.local(uv)
         sides = np.linalg.norm(local.first, axis=1)
         area = np.linalg.norm(np.cross(local.first[:, :, 0], local.first[:, :, 1]), axis=1)
         regular = (area > _DEGENERATE * sides[:, 0] * sides[:, 1]) & (sides > _DEGENERATE * sides.max()).all(axis=1)

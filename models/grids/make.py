@@ -1,0 +1,89 @@
+"""Writes orthogonal grids on seven surfaces, and the mesh file that one of them uses.
+
+    python models/grids/make.py
+
+Grids keep to their surface without supports when their lamellas' normal curvature varies or changes sign. Straight
+lamellas (asymptotic lines) and equally curved ones (a sphere) would let the hinges turn freely, so the networks here
+are iso-lines, curvature lines and geodesics.
+"""
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+JOINTS = 8  # a side, about
+
+
+def lines(half: float, count: int = JOINTS) -> list[float]:
+    return np.round(np.linspace(-half, half, count), 9).tolist()
+
+
+def isolines(u: float, v: float, n: int = JOINTS, m: int = JOINTS) -> dict:
+    return {"type": "isolines", "u": lines(u, n), "v": lines(v, m)}
+
+
+def geodesics(half: float, border: float) -> dict:
+    """Two families that leave the middle lines u = 0 and v = 0 at right angles."""
+    across = [[0.0, s, 0.0] for s in lines(half)] + [[s, 0.0, round(np.pi / 2, 12)] for s in lines(half)]
+    return {"type": "geodesics", "domain": [[-border, -border], [border, border]], "through": across}
+
+
+def analytic(name: str, **coefficients) -> dict:
+    return {"type": "analytic", "name": name, **coefficients}
+
+
+GRIDS = {
+    "dome": (analytic("paraboloid", a=-0.7, b=-0.4), isolines(0.8, 0.8, 9, 9)),
+    "dome_geodesics": (analytic("paraboloid", a=-0.6, b=-0.6), geodesics(0.75, 0.95)),
+    "saddle": (analytic("paraboloid", a=0.6, b=-0.6), isolines(0.8, 0.8, 9, 9)),
+    "enneper": (analytic("enneper", scale=1.4), isolines(0.48, 0.48)),
+    "catenoid": (analytic("catenoid", scale=1.0), isolines(0.8, 0.75, 9, 8)),
+    "free_form": (analytic("gaussians", bumps=[[0.35, -0.4, -0.3, 0.5], [-0.15, 0.5, 0.4, 0.45]]), isolines(0.8, 0.8, 9, 9)),
+    "mesh": ({"type": "mesh", "file": "vault.obj", "chart": "conformal"}, isolines(0.78, 0.72, 9, 8)),
+}
+
+
+def design(name: str, surface: dict, network: dict) -> dict:
+    return {
+        "format": "kop_exudyn/design", "version": 1, "class": "grid", "name": name,
+        "material": {"young": 2.1e9, "poisson": 0.35, "density": 900.0, "elastic_limit": 4.0e7},
+        "section": {"type": "rectangle", "width": 0.004, "height": 0.03},
+        "surface": surface, "network": network, "elements_per_piece": 2,
+    }
+
+
+def first(ring: int) -> int:
+    """Number of a ring's first vertex; the middle is ring 0."""
+    return 1 + 3 * ring * (ring - 1) if ring else 0
+
+
+def vault(path: Path, rings: int = 20) -> None:
+    """An asymmetric vault on a hexagonal outline: concentric rings of triangles."""
+    points, triangles = [(0.0, 0.0)], []
+    for ring in range(1, rings + 1):
+        corners = [ring * np.array([np.cos(k * np.pi / 3), np.sin(k * np.pi / 3)]) for k in range(7)]
+        points += [tuple(a + (b - a) * s / ring) for a, b in zip(corners, corners[1:]) for s in range(ring)]
+    x, y = 1.35 * np.array(points).T / rings
+    for ring in range(1, rings + 1):
+        for side in range(6):
+            for s in range(ring):
+                a, b = (first(ring) + (side * ring + s + k) % (6 * ring) for k in (0, 1))
+                inner = 6 * (ring - 1)
+                c = first(ring - 1) + (side * (ring - 1) + s) % inner if inner else 0
+                triangles.append((a, b, c))
+                if s < ring - 1:
+                    d = first(ring - 1) + (side * (ring - 1) + s + 1) % inner
+                    triangles.append((b, d, c))
+    z = 0.35 * np.cos(1.9 * x + 0.3) * np.cos(1.1 * y - 0.2)
+    rows = [f"v {a:.5f} {b:.5f} {c:.5f}" for a, b, c in zip(x, y, z)]
+    rows += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in triangles]
+    path.write_text("\n".join(rows) + "\n")
+
+
+if __name__ == "__main__":
+    folder = Path(__file__).parent
+    vault(folder / "vault.obj")
+    for number, (name, (surface, network)) in enumerate(GRIDS.items(), start=1):
+        (folder / f"{number:02d}_{name}.json").write_text(json.dumps(design(name, surface, network), indent=1) + "\n")
