@@ -52,7 +52,8 @@ class StageSettings:
     schedule : values of w_c, one after the other
     tight : largest rms distance of elements to their parts, relative to the kind's scale, at which raising w_c ends
     relaxed_steps, assigned_steps : accepted SQP steps at most, for each w_c and for the assigned stage
-    relaxed_tolerance, assigned_tolerance : a stage ends when a full step promises less than this share of J
+    relaxed_tolerance, last_tolerance, assigned_tolerance : the rounds of the relaxed stage before the last, the last
+        one, and the assigned stage end when steps promise or gain less than this share of J
     path_steps : steps of the watched path between the stages
     rescues : how often w_c is raised by ten when a design snaps on that path
     growth : how many parts a kind may then get more, when raising w_c didn't help
@@ -65,7 +66,8 @@ class StageSettings:
     tight: float = 1e-3
     relaxed_steps: int = 25
     assigned_steps: int = 40
-    relaxed_tolerance: float = 1e-3
+    relaxed_tolerance: float = 5e-3
+    last_tolerance: float = 1e-3
     assigned_tolerance: float = 1e-4
     path_steps: int = 10
     rescues: int = 2
@@ -209,7 +211,8 @@ class Stages:
         problem = RelaxedProblem(self.dataset, self.projection.with_weight(weight), kit, settings.bounds,
                                  fixed_kit=fixed_kit)
         options = SQPOptions(hessian=settings.hessian, max_steps=settings.relaxed_steps,
-                             decrease_tolerance=settings.relaxed_tolerance)
+                             decrease_tolerance=settings.last_tolerance if weight >= settings.schedule[-1]
+                             else settings.relaxed_tolerance)
         return self._sqp(name, problem, problem.point(q, list(evaluations), kit), options, weight), problem
 
     def _sqp(self, name: str, problem: Any, start: Point, options: SQPOptions, weight: float | None) -> SQPResult:

@@ -1,7 +1,11 @@
 """Scenes of a C-shell: the smooth design of pre-curved rods, and the straightened one with its corners.
 
+Both have the same bodies: joints, then along each strand the corners and the inner nodes of the half-pieces. In the
+smooth design a corner is a node of the curved rod, at the same share of the span. So a state of one design becomes a
+start for the other by the flat networks' difference, carried along with each body.
+
 The joint axis is the body's z axis. At a joint the first curve's rod is fixed to the body, the second one turns with a
-free hinge. A corner is a body between two pieces of a rod, its angle a prescribed hinge that a parameter drives.
+free hinge. A corner holds the two pieces of a rod, the second one behind a hinge whose angle a parameter drives.
 """
 from __future__ import annotations
 
@@ -9,168 +13,308 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..rods.rotations import log_so3, rotation_z
+from ..rods.rotations import rotation_z
 from ..rods.sections import Material, Section
 from ..scene.builder import SceneBuilder
 from ..scene.scene import Scene
-from .curve_network import CurveNetwork
-from .straight_network import StraightNetwork, StraightRod
+from ..scene.state import State
+from .base import ElementGroup
+from .network import CurveNetwork, Strand
+from .straightening import StraightStrand, straighten
 
 PLANAR = (2, 3, 4)  # height, and turns out of the plane: what an assembly lying on the floor can't do
 
 
 @dataclass(frozen=True)
-class ShellScene:
-    """A scene, and where to find things in it.
+class RodModel:
+    """What all rods are modelled with.
 
-    joints (J,) : bodies of the joints
-    hinges (J,) : their free hinges
-    tracks : for every curve, (span, fraction, body) of its bodies between joints, fraction of the span's length
+    rod_offset : distance of the two rods' axes at a joint, along the joint axis
+    elements : rod elements of each half-piece
     """
-
-    scene: Scene
-    joints: np.ndarray
-    hinges: np.ndarray
-    tracks: list[list[tuple[int, float, int]]]
-
-
-@dataclass(frozen=True)
-class Layout:
-    """What both scenes share: section, material, offset of the two rods along the joint axis."""
 
     section: Section
     material: Material
     rod_offset: float = 0.0
+    elements: int = 2
 
     @property
     def stiffness(self) -> np.ndarray:
         return self.section.stiffness(self.material)
 
 
-class _Joints:
-    """Joint bodies, hinges, and the node by which each rod sits on a joint."""
+@dataclass(frozen=True)
+class HalfPiece:
+    """What lies between a joint and a corner (or a free tip), in the direction of its strand.
 
-    def __init__(self, builder: SceneBuilder, network: CurveNetwork, layout: Layout):
-        self.builder, self.layout, self.network = builder, layout, network
-        headings = {(run.number, int(j)): run.curve.heading(u)
-                    for run in network.runs for j, u in zip(run.joints, run.parameters)}
-        first = np.array([headings[int(a), j] for j, (a, _) in enumerate(network.pairs)])
-        second = np.array([headings[int(b), j] for j, (_, b) in enumerate(network.pairs)])
-        flat = np.concatenate([network.positions, np.zeros((len(first), 1))], axis=1)
-        self.bodies = builder.bodies(flat, rotation_z(first))
-        self.hinges = builder.hinges(np.mod(second - first + np.pi, 2 * np.pi) - np.pi)
+    strand : number of its curve; bodies (elements + 1,) : from one end to the other
+    stations (elements + 1,) : arc lengths on the smooth curve
+    parameter : its length's place in q
+    """
 
-    def node(self, curve: int, joint: int) -> int:
-        """A node at a joint, its axes along the curve there."""
-        turns = int(self.network.pairs[joint, 1]) == curve
-        lift = 0.5 * self.layout.rod_offset * (1 if turns else -1)
-        return int(self.builder.nodes([self.bodies[joint]], [self.hinges[joint] if turns else -1],
-                                      offset=[[0.0, 0.0, lift]])[0])
-
-    def finish(self, planar: bool) -> Scene:
-        """Actuate all hinges, hold the joint nearest to the middle."""
-        builder = self.builder
-        builder.mean_angle(self.hinges)
-        middle = self.network.positions - self.network.positions.mean(axis=0)
-        builder.pin(int(self.bodies[np.argmin(np.linalg.norm(middle, axis=1))]))
-        scene = builder.build()
-        if not planar:
-            return scene
-        pinned = scene.pinned.copy()
-        pinned[: 6 * scene.n_bodies].reshape(-1, 6)[:, PLANAR] = True
-        return scene.with_pins(pinned)
+    strand: int
+    bodies: np.ndarray
+    stations: np.ndarray
+    parameter: int
 
 
-def smooth_scene(network: CurveNetwork, layout: Layout, elements_per_span: int, free_ends: bool) -> ShellScene:
-    """Pre-curved rods that follow the curves: unstressed in the flat network."""
-    builder = SceneBuilder()
-    joints = _Joints(builder, network, layout)
-    tracks = []
-    for run in network.runs:
-        curve, track = run.curve, []
-        spans = [(joints.node(run.number, a), joints.node(run.number, b), u, v) for a, b, u, v in run.spans]
-        if free_ends and not curve.closed:
-            u, v = run.parameters[[0, -1]]
-            spans += [(None, joints.node(run.number, int(run.joints[0])), 0.0, u)] if u > 1e-9 * curve.end else []
-            spans += [(joints.node(run.number, int(run.joints[-1])), None, v, curve.end)] if v < (1 - 1e-9) * curve.end else []
-        for k, (tail, head, u, v) in enumerate(spans):
-            fractions = np.linspace(0, 1, elements_per_span + 1)
-            stops = curve.at_lengths(u, v, fractions)
-            headings = curve.heading(u) + np.array([curve.turning(u, s) if s > u else 0.0 for s in stops])
-            x = np.concatenate([curve.position(stops), np.zeros((len(stops), 1))], axis=1)
-            own = slice(0 if tail is None else 1, None if head is None else -1)
-            bodies = builder.bodies(x[own], rotation_z(headings[own]))
-            nodes = builder.nodes(bodies).tolist()
-            track += [(k, float(f), int(b)) for f, b in zip(fractions[own], bodies)] if k < len(run.spans) else []
-            lengths = curve.length(u, v) / elements_per_span
-            builder.rod(([] if tail is None else [tail]) + nodes + ([] if head is None else [head]), layout.stiffness,
-                        length=np.full(elements_per_span, lengths), section=layout.section,
-                        rest_strain=_relative_motions(x, rotation_z(headings)) / lengths)
-        tracks.append(track)
-    return ShellScene(joints.finish(planar=False), joints.bodies, joints.hinges, tracks)
+@dataclass(frozen=True)
+class ShellLayout:
+    """All bodies of a C-shell in the plane, for both of its designs, and the straightened design's parameters.
+
+    smooth, straight (n, 3) : x, y and direction (rad) of every body
+    hinges (2, n_joints) : joint angles of the smooth and of the straightened design
+    halves (n_joints,) : half-turns between the hinge and the second rod's direction of travel
+    pieces : half-pieces; corners (m, 2) : body and parameter of every corner
+    parameters (nq,) q; is_length (nq,) bool; groups : the elements
+    """
+
+    network: CurveNetwork
+    smooth: np.ndarray
+    straight: np.ndarray
+    hinges: np.ndarray
+    halves: np.ndarray
+    pieces: list[HalfPiece]
+    corners: np.ndarray
+    parameters: np.ndarray
+    is_length: np.ndarray
+    groups: list[ElementGroup]
+
+    @property
+    def joints(self) -> np.ndarray:
+        return np.arange(self.network.n_joints)
+
+    def straightened(self, state: State, scene: Scene) -> State:
+        """A start for the straightened design's scene, from a state of the smooth one."""
+        flat = self.straight - self.smooth
+        local = np.einsum("nji,nj->ni", rotation_z(self.smooth[:, 2]),
+                          np.concatenate([flat[:, :2], np.zeros((len(flat), 1))], axis=1))
+        n = self.network.n_joints
+        return State(
+            state.positions + np.einsum("nij,nj->ni", state.rotations, local),
+            state.rotations @ rotation_z(flat[:, 2]),
+            np.concatenate([state.angles[:n] + self.hinges[1] - self.hinges[0], scene.initial.angles[n:]]),
+        )
 
 
-def straight_scene(network: CurveNetwork, straight: StraightNetwork, layout: Layout, elements_per_piece: int,
-                   planar: bool = False) -> ShellScene:
-    """Straight pieces and driven corners, laid out along the flat network."""
-    builder = SceneBuilder(len(straight.parameters))
-    joints = _Joints(builder, network, layout)
-    tracks = [_add_rod(builder, joints, rod, straight.parameters, layout, elements_per_piece) for rod in straight.rods]
-    return ShellScene(joints.finish(planar), joints.bodies, joints.hinges, tracks)
+def lay_out(network: CurveNetwork, elements: int) -> ShellLayout:
+    """Place all bodies and number the parameters: a strand's half-pieces, its free ends, its corners; then the next.
+
+    Raises InputError where one corner can't follow a span.
+    """
+    straights = [straighten(strand, network.joints, f"curves[{k}].points") for k, strand in enumerate(network.strands)]
+    build = _LayoutBuilder(network, elements)
+    for number, straight in enumerate(straights):
+        build.add(number, straight)
+    return build.finish(straights)
 
 
-def _add_rod(builder: SceneBuilder, joints: _Joints, rod: StraightRod, q: np.ndarray, layout: Layout,
-             pieces: int) -> list[tuple[int, float, int]]:
-    """One straightened curve; returns its track."""
-    run, track = rod.run, []
-    stations = [joints.node(run.number, int(j)) for j in run.joints]
-    if run.curve.closed:
-        stations.append(joints.node(run.number, int(run.joints[0])))
-    flat = joints.network.positions
+def shell_scene(layout: ShellLayout, model: RodModel, *, straight: bool, planar: bool = False,
+                imperfection: float = 0.0) -> Scene:
+    """The smooth or the straightened design's scene, laid out flat; its actuation is the mean opening angle.
 
-    def piece(tail: int, head: int, start: np.ndarray, stop: np.ndarray, heading: float, parameter: int,
-              span: int, fractions: tuple[float, float]) -> None:
-        steps = np.linspace(0, 1, pieces + 1)[1:-1]
-        x = np.concatenate([start + steps[:, None] * (stop - start), np.zeros((len(steps), 1))], axis=1)
-        bodies = builder.bodies(x, rotation_z(heading))
-        at = fractions[0] + steps * (fractions[1] - fractions[0])
-        track.extend((span, float(f), int(b)) for f, b in zip(at, bodies))
-        builder.rod([tail, *builder.nodes(bodies), head], layout.stiffness, parameter=parameter, section=layout.section)
-
-    for k, (j0, j1, _, _) in enumerate(run.spans):
-        heading, angle = rod.headings[k], q[rod.corners[k]]
-        l1, l2 = q[rod.before[k]], q[rod.after[k]]
-        corner = int(builder.bodies([[*rod.points[k], 0.0]], rotation_z(heading))[0])
-        hinge = builder.hinges([0.0], parameter=int(rod.corners[k]), prescribed=True)
-        arrive, leave = builder.nodes([corner, corner], [-1, int(hinge[0])])
-        share = l1 / (l1 + l2)
-        track.append((k, share, corner))
-        piece(stations[k], int(arrive), flat[j0], rod.points[k], heading, int(rod.before[k]), k, (0.0, share))
-        piece(int(leave), stations[k + 1], rod.points[k], flat[j1], heading + angle, int(rod.after[k]), k, (share, 1.0))
-    for end, (tip, joint) in enumerate(zip(rod.tips, (0, -1))):
-        if tip >= 0:
-            _add_tip(builder, layout, rod, q, tip, stations[joint], flat[run.joints[joint]], pieces, first=end == 0)
-    return track
+    planar : out-of-plane freedoms removed
+    imperfection : height, relative to the size, of a shallow surface that the rods' rest shapes follow
+    """
+    network = layout.network
+    build = SceneBuilder(len(layout.parameters) if straight else 0)
+    poses = layout.straight if straight else layout.smooth
+    lift = 0.5 * model.rod_offset
+    bodies = build.bodies(np.concatenate([poses[:, :2], _heights(layout, lift)[:, None]], axis=1), rotation_z(poses[:, 2]))
+    hinges = build.hinges(layout.hinges[int(straight)])
+    ends = _EndNodes(build, layout, hinges, lift)
+    if straight:
+        ends.add_corners()
+    inner = build.nodes(bodies)
+    for piece in layout.pieces:
+        nodes = [ends.node(piece, 0), *inner[piece.bodies[1:-1]], ends.node(piece, -1)]
+        nodes = [int(inner[b] if n is None else n) for n, b in zip(nodes, piece.bodies)]
+        strain = _rest_strain(layout, piece, straight, imperfection)
+        length = {"parameter": piece.parameter} if straight else {"length": np.diff(piece.stations)}
+        build.rod(nodes, model.stiffness, section=model.section, rest_strain=strain, **length)
+    build.mean_angle(hinges[network.opens])
+    build.pin(int(bodies[np.argmin(np.hypot(*(network.joints - network.joints.mean(axis=0)).T))]))
+    if planar:
+        for body in bodies:
+            build.pin(int(body), PLANAR)
+    return build.build()
 
 
-def _add_tip(builder: SceneBuilder, layout: Layout, rod: StraightRod, q: np.ndarray, parameter: int, station: int,
-             joint: np.ndarray, pieces: int, first: bool) -> None:
-    """The straight end of a rod beyond its outermost joint."""
-    run = rod.run
-    heading = run.curve.heading(run.parameters[0 if first else -1])
-    direction = np.array([np.cos(heading), np.sin(heading), 0.0]) * q[parameter]
-    steps = np.linspace(-1, 0, pieces + 1)[:-1] if first else np.linspace(0, 1, pieces + 1)[1:]
-    bodies = builder.bodies(np.append(joint, 0.0) + steps[:, None] * direction, rotation_z(heading))
-    nodes = builder.nodes(bodies).tolist()
-    builder.rod(nodes + [station] if first else [station] + nodes, layout.stiffness, parameter=parameter,
-                section=layout.section)
+class _LayoutBuilder:
+    """Collects bodies and parameters strand by strand."""
+
+    def __init__(self, network: CurveNetwork, elements: int):
+        self.network, self.elements = network, elements
+        flat = np.concatenate([network.joints, network.directions[:, :1]], axis=1)
+        self.smooth, self.straight = [flat], [flat.copy()]
+        self.n_bodies, self.values, self.is_length = len(flat), [], []
+        self.pieces: list[HalfPiece] = []
+        self.corners: list[tuple[int, int]] = []
+        self.full: list[tuple[int, int]] = []
+        self.ends: list[tuple[int]] = []
+
+    def add(self, number: int, straight: StraightStrand) -> None:
+        strand, first = straight.strand, len(self.values)
+        n, following = strand.n_spans, np.roll(np.arange(len(strand.joints)), -1)
+        self._parameters(straight.lengths.ravel(), lengths=True)
+        out, into = first + 2 * np.arange(n), first + 2 * np.arange(n) + 1
+        tips = [self._tip(number, straight, end) for end in (0, -1)]
+        corner = self._parameters(straight.corners, lengths=False)
+        self.full += zip(into[:-1].tolist(), out[1:].tolist())
+        if strand.closed:
+            self.full.append((int(into[-1]), int(out[0])))
+        elif n:
+            self._outer(tips[0], int(out[0]))
+            self._outer(tips[1], int(into[-1]))
+        elif None in tips:
+            self.ends += [(tip,) for tip in tips if tip is not None]
+        else:
+            self.full.append(tuple(tips))
+        for k, (begin, end) in enumerate(strand.spans):
+            l1, l2 = straight.lengths[k]
+            angles = straight.angles[k], straight.angles[k] + straight.corners[k]
+            tail, head = strand.joints[k], strand.joints[following[k]]
+            middle = begin + l1 / (l1 + l2) * (end - begin)
+            x = self.network.joints[tail] + l1 * _direction(angles[0]) if straight.exact[k] else \
+                0.5 * (self.network.joints[tail] + self.network.joints[head])
+            body = self._bodies(strand, np.array([middle]), x[None], angles[0])[0]
+            self.corners.append((body, int(corner[k])))
+            self._piece(number, strand, (tail, body), (begin, middle), (self.network.joints[tail], x), angles[0], out[k])
+            self._piece(number, strand, (body, head), (middle, end), (x, self.network.joints[head]), angles[1], into[k])
+
+    def finish(self, straights: list[StraightStrand]) -> ShellLayout:
+        network = self.network
+        smooth, straight = np.concatenate(self.smooth), np.concatenate(self.straight)
+        turn = network.directions[:, 1] - network.directions[:, 0]
+        hinge = network.opening_angles
+        shift = np.array([[straights[c].angles[k] - straights[c].strand.angles[k] for c, k in zip(pair, place)]
+                          for pair, place in zip(network.pairs, network.places)])
+        straight[: network.n_joints, 2] += shift[:, 0]
+        groups = [ElementGroup("linear", np.array(rows, int)) for rows in (self.full, self.ends) if rows]
+        groups += [ElementGroup("angular", np.array(self.corners, int)[:, 1:])] if self.corners else []
+        return ShellLayout(
+            network, smooth, straight, np.stack([hinge, hinge + shift[:, 1] - shift[:, 0]]),
+            np.round((turn - hinge) / np.pi).astype(int), self.pieces, np.array(self.corners, int).reshape(-1, 2),
+            np.array(self.values), np.array(self.is_length), groups)
+
+    def _outer(self, tip: int | None, inner: int) -> None:
+        """The element at a strand's end: with the free end, or one length alone."""
+        self.ends.append((inner,)) if tip is None else self.full.append((tip, inner))
+
+    def _tip(self, number: int, straight: StraightStrand, end: int) -> int | None:
+        """The free end before the first (0) or after the last (-1) joint; its parameter."""
+        strand = straight.strand
+        length = strand.tail if end else strand.head
+        if not length:
+            return None
+        parameter = int(self._parameters([length], lengths=True)[0])
+        joint, at, angle = strand.joints[end], strand.stations[end], straight.angles[end]
+        x, far = self.network.joints[joint], at + length if end else at - length
+        tip = x + (length if end else -length) * _direction(angle)
+        body = self._bodies(strand, np.array([far]), tip[None], angle)[0]
+        if end:
+            self._piece(number, strand, (joint, body), (at, far), (x, tip), angle, parameter)
+        else:
+            self._piece(number, strand, (body, joint), (far, at), (tip, x), angle, parameter)
+        return parameter
+
+    def _piece(self, number, strand: Strand, ends, stations, points, angle: float, parameter: int) -> None:
+        share = np.linspace(0, 1, self.elements + 1)
+        s = stations[0] + share * (stations[1] - stations[0])
+        x = points[0] + share[1:-1, None] * (points[1] - points[0])
+        inner = self._bodies(strand, s[1:-1], x, angle)
+        self.pieces.append(HalfPiece(number, np.array([ends[0], *inner, ends[1]]), s, int(parameter)))
+
+    def _bodies(self, strand: Strand, s: np.ndarray, x: np.ndarray, angle: float) -> np.ndarray:
+        """Bodies at arc lengths s of the smooth curve and at x (n, 2) of a straight piece."""
+        self.smooth.append(np.concatenate([strand.curve.position(s), strand.curve.angle(s)[:, None]], axis=1))
+        self.straight.append(np.concatenate([x, np.full((len(s), 1), angle)], axis=1))
+        self.n_bodies += len(s)
+        return np.arange(self.n_bodies - len(s), self.n_bodies)
+
+    def _parameters(self, values, lengths: bool) -> np.ndarray:
+        start = len(self.values)
+        self.values += [float(v) for v in values]
+        self.is_length += [lengths] * len(values)
+        return np.arange(start, len(self.values))
 
 
-def _relative_motions(x: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """(k, 6) h = log(H_i^-1 H_i+1) of poses after each other, turning about z: u = A(phi) p."""
-    p = np.einsum("nji,nj->ni", R[:-1], np.diff(x, axis=0))
-    phi = log_so3(np.swapaxes(R[:-1], 1, 2) @ R[1:])
-    half = 0.5 * phi[:, 2]
-    a = np.where(np.abs(half) < 1e-6, 1 - half**2 / 3, half / np.tan(np.where(half == 0, 1.0, half)))
-    u = np.stack([a * p[:, 0] + half * p[:, 1], a * p[:, 1] - half * p[:, 0], p[:, 2]], axis=1)
-    return np.concatenate([u, phi], axis=1)
+class _EndNodes:
+    """Nodes at the ends of half-pieces: on joints for each of the two rods, on corners before and behind the hinge."""
+
+    def __init__(self, build: SceneBuilder, layout: ShellLayout, hinges: np.ndarray, lift: float):
+        self.build, self.layout = build, layout
+        n = layout.network.n_joints
+        flipped = np.where(layout.halves % 2 == 1, -1.0, 1.0)
+        frames = np.zeros((n, 3, 3))
+        frames[:, 0, 0], frames[:, 1, 1], frames[:, 2, 2] = flipped, flipped, 1.0
+        first = build.nodes(layout.joints, offset=[[0.0, 0.0, -lift]])
+        second = build.nodes(layout.joints, hinges, frames, [[0.0, 0.0, lift]])
+        self._joint = np.stack([first, second], axis=1)
+        self._leaving: dict[int, int] = {}
+
+    def add_corners(self) -> None:
+        bodies, parameters = self.layout.corners.T
+        hinges = self.build.hinges(np.zeros(len(bodies)), parameter=parameters, prescribed=True)
+        self._leaving = dict(zip(bodies.tolist(), self.build.nodes(bodies, hinges).tolist()))
+
+    def node(self, piece: HalfPiece, end: int) -> int | None:
+        """The node at a half-piece's end; None where it is the body's plain node."""
+        body = int(piece.bodies[end])
+        if body < self.layout.network.n_joints:
+            return int(self._joint[body, int(self.layout.network.pairs[body, 1] == piece.strand)])
+        return self._leaving.get(body) if end == 0 else None
+
+
+def _heights(layout: ShellLayout, lift: float) -> np.ndarray:
+    """Heights (n,) of all bodies: joints at zero, the rods' bodies between the heights of their nodes at the joints."""
+    z = np.zeros(len(layout.smooth))
+    if not lift:
+        return z
+    n, pairs = layout.network.n_joints, layout.network.pairs
+    at_joint: dict[int, list[float]] = {}
+    for piece in layout.pieces:
+        for body in piece.bodies[[0, -1]]:
+            if body < n:
+                height = lift if pairs[body, 1] == piece.strand else -lift
+                at_joint.setdefault(int(piece.bodies[0] if body == piece.bodies[-1] else piece.bodies[-1]), []).append(height)
+                z[piece.bodies[1:-1]] = height
+    for body, heights in at_joint.items():
+        z[body] = np.mean(heights)
+    return z
+
+
+def _rest_strain(layout: ShellLayout, piece: HalfPiece, straight: bool, imperfection: float) -> np.ndarray:
+    """(elements, 6) rest strain measure: straight, or such that the flat smooth network is unstressed."""
+    strain = np.zeros((len(piece.bodies) - 1, 6))
+    poses = (layout.straight if straight else layout.smooth)[piece.bodies]
+    strand = layout.network.strands[piece.strand]
+    angles = strand.curve.angle(piece.stations)
+    if straight:
+        strain[:, 0] = 1.0
+    else:
+        strain[:, [0, 1, 5]] = _planar_motions(poses[:, :2], angles) / np.diff(piece.stations)[:, None]
+    if imperfection:
+        c, s = np.cos(angles[:-1]), np.sin(angles[:-1])
+        xx, xy, yy = imperfection / layout.network.size * _SHALLOW
+        strain[:, 3] = (yy - xx) * c * s + xy * (c * c - s * s)
+        strain[:, 4] = -(xx * c * c + 2 * xy * c * s + yy * s * s)
+    return strain
+
+
+# Second derivatives of the shallow surface of imperfect rest shapes, unlike those of any symmetric buckling mode.
+_SHALLOW = np.array([3.4, 0.3, 0.6])
+
+
+def _planar_motions(x: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """(k, 3) stretch, shear and turn h = log(H_i^-1 H_i+1) between poses (k + 1) after each other in the plane."""
+    phi = np.diff(angles)
+    step, c, s = np.diff(x, axis=0), np.cos(angles[:-1]), np.sin(angles[:-1])
+    p = c * step[:, 0] + s * step[:, 1], c * step[:, 1] - s * step[:, 0]
+    half = 0.5 * phi
+    a = np.where(np.abs(half) < 1e-4, 1 - half**2 / 3, half / np.tan(np.where(half == 0, 1.0, half)))
+    return np.stack([a * p[0] + half * p[1], a * p[1] - half * p[0], phi], axis=1)
+
+
+def _direction(angle: float) -> np.ndarray:
+    return np.array([np.cos(angle), np.sin(angle)])
