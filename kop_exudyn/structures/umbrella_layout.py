@@ -124,7 +124,8 @@ def umbrella_mesh(base: BaseMesh, lengths: Any, plates: Plates = Plates(),
     return UmbrellaMesh(
         positions=outline.positions, frames=outline.frames, hinged=outline.hinged, rods=outline.rods(),
         centres=outline.centres, crossings=outline.crossings, lengths=lengths, thickness=plates.thickness,
-        width=plates.width, plate_edge=base.edge - np.sqrt(3) * plates.thickness, spacing=plates.spacing, target=target)
+        width=plates.width, plate_edge=base.edge - np.sqrt(3) * plates.thickness, spacing=plates.spacing,
+        size=outline.size(), target=target)
 
 
 class _Outline:
@@ -173,6 +174,18 @@ class _Outline:
         self.positions[self.crossings] = _flat(base.midpoints) + t / 2 * self.outward[seen]
         self.frames[self.crossings] = _axes(np.broadcast_to(-_UP, (len(seen), 3)), self.along[seen])
         self.hinged[self.crossings] = True
+
+    def size(self) -> float:
+        """Bounding-box diagonal of all joints and of the ends that rods on plate edges without arms would have."""
+        base, a = self.base, self.plates.arm_position
+        corners = base.vertices[base.faces]
+        middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
+        outward = (middles - base.centres[:, None]) / base.inradius
+        shift = a * np.stack([outward[:, :, 1], -outward[:, :, 0]], axis=2)
+        height = self.positions[self.centres, 2]
+        points = [np.concatenate([middles + sign * shift, np.broadcast_to(height[:, None, [side]], (len(height), 3, 1))],
+                                 axis=2).reshape(-1, 3) for side, sign in ((TOP, -1), (BOTTOM, 1))]
+        return float(np.linalg.norm(np.ptp(np.concatenate([self.positions, *points]), axis=0)))
 
     def _seen_from_unflipped(self) -> np.ndarray:
         """(n_edges,) the port of every edge in its unflipped cell."""

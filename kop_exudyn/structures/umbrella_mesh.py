@@ -65,6 +65,7 @@ class UmbrellaMesh:
     thickness, width : of plate rods and arms
     plate_edge : length of a plate's edges
     spacing : distance h* of a cell's plates that the actuators aim at
+    size : bounding-box diagonal of the compact mesh with all its plate edges, the unit of length of actuator weights
     target : or None
     unit : length of this mesh's unit in mm
     """
@@ -80,17 +81,13 @@ class UmbrellaMesh:
     width: float
     plate_edge: float
     spacing: float
+    size: float
     target: UmbrellaTarget | None
     unit: float = 1.0
 
     @property
     def n_cells(self) -> int:
         return len(self.centres)
-
-    @cached_property
-    def size(self) -> float:
-        """Bounding-box diagonal of the compact joints."""
-        return float(np.linalg.norm(np.ptp(self.positions, axis=0)))
 
     @cached_property
     def joint_lifts(self) -> tuple[np.ndarray, np.ndarray]:

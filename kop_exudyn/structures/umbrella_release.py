@@ -51,9 +51,13 @@ def release_mesh(data: Mapping[str, Any], source: str = "umbrella mesh") -> Umbr
         positions=positions, frames=_frames(read, n), hinged=hinged, rods=rods,
         centres=_centres(read, labels, own, n_cells), crossings=crossings, lengths=lengths, thickness=thickness,
         width=read.number("width", _WIDTH / unit), plate_edge=read.number("plate_edge_length", _PLATE_EDGE / unit),
-        spacing=read.number("target_spacing_factor", 5.0) * thickness, target=_target(read, crossings, n, n_cells),
-        unit=unit,
+        spacing=read.number("target_spacing_factor", 5.0) * thickness, size=_diagonal(positions),
+        target=_target(read, crossings, n, n_cells), unit=unit,
     )
+
+
+def _diagonal(positions: np.ndarray) -> float:
+    return float(np.linalg.norm(np.ptp(positions, axis=0)))
 
 
 def _frames(read: _Fields, n: int) -> np.ndarray:

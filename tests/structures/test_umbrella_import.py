@@ -1,0 +1,40 @@
+"""Released umbrella meshes as design files of our own; skipped where the released files are absent."""
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+from scipy.spatial.distance import pdist
+
+from kop_exudyn.errors import InputError
+from kop_exudyn.io.documents import check_schema
+from kop_exudyn.io.json_files import read_json
+from kop_exudyn.structures.base import design_from_dict
+from kop_exudyn.structures.umbrella import Umbrella
+from kop_exudyn.structures.umbrella_import import import_release
+
+
+@pytest.fixture(scope="module")
+def content(shared_data):
+    return read_json(shared_data / "umbrella" / "sphere_cap_0.3.json.gz")
+
+
+def test_imported_design_is_the_same_structure_in_millimetres(content):
+    data = import_release(content, "cap")
+    check_schema(data, "umbrella")
+    own, released = design_from_dict(data), Umbrella.from_release(content)
+    unit = released.mesh.unit
+    assert own.parameters == pytest.approx(unit * released.parameters)
+    assert own.lower == pytest.approx(unit * released.lower)
+    a, b = own.deploy()["deployed"], released.deploy()["deployed"]
+    assert a.elastic_energy == pytest.approx(unit**3 * b.elastic_energy, rel=1e-6)
+    distances = [np.sort(pdist(eq.state.positions[d.joints])) for eq, d in ((a, own), (b, released))]
+    assert distances[0] == pytest.approx(unit * distances[1], rel=1e-4)
+
+
+def test_a_mesh_with_other_arms_is_refused(content):
+    data = copy.deepcopy(content)
+    data["flip_bits"] = [not bit for bit in data["flip_bits"]]
+    with pytest.raises(InputError, match="base mesh"):
+        import_release(data, "cap", "file.json")
