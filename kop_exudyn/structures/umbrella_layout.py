@@ -183,8 +183,8 @@ class _Outline:
         outward = (middles - base.centres[:, None]) / base.inradius
         shift = a * np.stack([outward[:, :, 1], -outward[:, :, 0]], axis=2)
         height = self.positions[self.centres, 2]
-        points = [np.concatenate([middles + sign * shift, np.broadcast_to(height[:, None, [side]], (len(height), 3, 1))],
-                                 axis=2).reshape(-1, 3) for side, sign in ((TOP, -1), (BOTTOM, 1))]
+        points = [np.dstack([middles + sign * shift, np.repeat(height[:, [side]], 3, axis=1)]).reshape(-1, 3)
+                  for side, sign in ((TOP, -1), (BOTTOM, 1))]
         return float(np.linalg.norm(np.ptp(np.concatenate([self.positions, *points]), axis=0)))
 
     def _seen_from_unflipped(self) -> np.ndarray:
