@@ -1,10 +1,10 @@
-"""Writes orthogonal grids on seven surfaces, and the mesh file that one of them uses.
+"""Writes orthogonal grids on six surfaces, and the mesh file that one of them uses.
 
     python models/grids/make.py
 
 Grids keep to their surface without supports when their lamellas' normal curvature varies or changes sign. Straight
-lamellas (asymptotic lines) and equally curved ones (a sphere) would let the hinges turn freely, so the networks here
-are iso-lines, curvature lines and geodesics.
+lamellas (asymptotic lines) and equally curved ones (on a sphere) would let the hinges turn freely. Lines of u and v on
+the two minimal surfaces are their curvature lines.
 """
 from __future__ import annotations
 
@@ -16,32 +16,29 @@ import numpy as np
 JOINTS = 8  # a side, about
 
 
-def lines(half: float, count: int = JOINTS) -> list[float]:
-    return np.round(np.linspace(-half, half, count), 9).tolist()
+def lines(half: float, count: int = JOINTS, grading: float = 0.0) -> list[float]:
+    """Numbers from -half to half, with positive grading denser in the middle."""
+    t = np.linspace(-1, 1, count)
+    return np.round(half * (t + grading * t**3) / (1 + grading), 9).tolist()
 
 
-def isolines(u: float, v: float, n: int = JOINTS, m: int = JOINTS) -> dict:
-    return {"type": "isolines", "u": lines(u, n), "v": lines(v, m)}
-
-
-def geodesics(half: float, border: float) -> dict:
-    """Two families that leave the middle lines u = 0 and v = 0 at right angles."""
-    across = [[0.0, s, 0.0] for s in lines(half)] + [[s, 0.0, round(np.pi / 2, 12)] for s in lines(half)]
-    return {"type": "geodesics", "domain": [[-border, -border], [border, border]], "through": across}
+def isolines(u: list[float], v: list[float]) -> dict:
+    return {"type": "isolines", "u": u, "v": v}
 
 
 def analytic(name: str, **coefficients) -> dict:
     return {"type": "analytic", "name": name, **coefficients}
 
 
+WAVES = [[0.35, -0.4, -0.3, 0.5], [-0.15, 0.5, 0.4, 0.45]]  # height, centre, width
+SKEW_SADDLE = [[0, 0, -0.35], [0, 0.1], [0.25], [0.15]]
 GRIDS = {
-    "dome": (analytic("paraboloid", a=-0.7, b=-0.4), isolines(0.8, 0.8, 9, 9)),
-    "dome_geodesics": (analytic("paraboloid", a=-0.6, b=-0.6), geodesics(0.75, 0.95)),
-    "saddle": (analytic("paraboloid", a=0.6, b=-0.6), isolines(0.8, 0.8, 9, 9)),
-    "enneper": (analytic("enneper", scale=1.4), isolines(0.48, 0.48)),
-    "catenoid": (analytic("catenoid", scale=1.0), isolines(0.8, 0.75, 9, 8)),
-    "free_form": (analytic("gaussians", bumps=[[0.35, -0.4, -0.3, 0.5], [-0.15, 0.5, 0.4, 0.45]]), isolines(0.8, 0.8, 9, 9)),
-    "mesh": ({"type": "mesh", "file": "vault.obj", "chart": "conformal"}, isolines(0.78, 0.72, 9, 8)),
+    "dome": (analytic("paraboloid", a=-0.7, b=-0.4), isolines(lines(0.8, 9, 0.3), lines(0.8, 9, -0.2))),
+    "saddle": (analytic("polynomial", coefficients=SKEW_SADDLE), isolines(lines(0.8), lines(0.8))),
+    "enneper": (analytic("enneper", scale=1.4), isolines(lines(0.48), lines(0.48))),
+    "catenoid": (analytic("catenoid", scale=1.0), isolines(lines(0.85, 9), lines(0.75, 8))),
+    "free_form": (analytic("gaussians", bumps=WAVES), isolines(lines(0.8, 9), lines(0.8, 9))),
+    "mesh": ({"type": "mesh", "file": "vault.obj", "chart": "conformal"}, isolines(lines(0.78, 9), lines(0.72))),
 }
 
 

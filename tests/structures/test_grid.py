@@ -196,6 +196,24 @@ def test_units_do_not_matter(saddle, deployed):
     np.testing.assert_allclose(state.state.positions[grid.joints], 1000 * deployed.state.positions[saddle.joints], atol=1e-5)
 
 
+def test_geodesic_lamellas_bend_in_their_own_planes_only():
+    """So they need much less energy than iso-lines of the same surface, which bend sideways too."""
+    through = [[0.0, s, 0.0] for s in lines(0.4, 4)] + [[s, 0.0, np.pi / 2] for s in lines(0.4, 4)]
+    network = {"type": "geodesics", "domain": [[-0.6, -0.6], [0.6, 0.6]], "through": through}
+    surface = {"name": "paraboloid", "a": -1.2, "b": -0.9}
+    traced, iso = (design_from_dict(grid_data(surface, n)).deploy()["deployed"] for n in (network, isolines(0.4, 4)))
+    assert traced.elastic_energy < 0.2 * iso.elastic_energy
+
+
+def test_curvature_lines_of_a_minimal_surface_give_the_grid_of_its_isolines():
+    network = {"type": "curvature", "domain": [[-0.45, -0.45], [0.45, 0.45]],
+               "points": [[x, x + 0.01] for x in lines(0.4, 4)]}
+    grids = [design_from_dict(grid_data({"name": "enneper", "scale": 1.0}, n)) for n in (
+        network, {"type": "isolines", "u": lines(0.4, 4), "v": [x + 0.01 for x in lines(0.4, 4)]})]
+    corners = [np.sort(grid.parameters[~grid.straight.is_length]) for grid in grids]
+    np.testing.assert_allclose(*corners, atol=1e-6)
+
+
 def test_closed_lamellas_have_no_ends():
     turns = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     rings = [{"points": (r * np.stack([np.cos(turns), np.sin(turns)], axis=1)).tolist(), "closed": True} for r in (0.4, 0.6)]
