@@ -118,11 +118,16 @@ def general(
     if outline is None:
         y, z = np.sqrt(3 * inertia_z / area), np.sqrt(3 * inertia_y / area)
         outline = np.array([[y, z], [-y, z], [-y, -z], [y, -z]])
-    outline = np.asarray(outline, float)
+    try:
+        outline = np.asarray(outline, float)
+    except (TypeError, ValueError):
+        outline = np.empty(0)
     if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3 or not np.isfinite(outline).all():
         raise InputError("an outline needs at least three finite points (y, z)", field="section.outline", value=outline)
-    if torsion_modulus is None:
-        torsion_modulus = 2 * float(np.min(np.ptp(outline, axis=0))) / 2
+    if torsion_modulus is not None:
+        _positive("section.torsion_modulus", torsion_modulus)
+    else:
+        torsion_modulus = float(np.min(np.ptp(outline, axis=0)))  # as of a thin strip
     return Section(area, inertia_y, inertia_z, torsion, shear_y, shear_z, outline, torsion_modulus)
 
 
