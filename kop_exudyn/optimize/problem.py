@@ -42,11 +42,13 @@ class Derivatives:
     gradient : (n,)
     hessian : (n, n) sparse symmetric, both triangles, perhaps indefinite; None for quasi-Newton use
     extra : see LiftedTerm; comes on top of ``hessian``
+    own_gradient : (n,) gradient of the part that ``hessian`` belongs to, without the lifted term's (default: all)
     """
 
     gradient: np.ndarray
     hessian: sp.csc_matrix | None = None
     extra: LiftedTerm | None = None
+    own_gradient: np.ndarray | None = None
 
 
 class Problem(Protocol):

@@ -67,8 +67,8 @@ class RelaxedProblem:
         designs = self.dataset.derivatives(data.evaluations, hessian=True)
         data.evaluations = [d.evaluation for d in designs]
         weights = self.dataset.design_weights
-        gradient = np.concatenate([w * d.gradient for w, d in zip(weights, designs)])
-        gradient += self.projection.gradient(point.x, data.kit, data.assignment)
+        own = np.concatenate([w * d.gradient for w, d in zip(weights, designs)])
+        gradient = own + self.projection.gradient(point.x, data.kit, data.assignment)
         hessian = sp.block_diag([w * d.hessian for w, d in zip(weights, designs)], format="csc")
         quadratic = self.projection.hessian(point.x, data.kit, data.assignment)
         if self.fixed_kit:
@@ -76,7 +76,7 @@ class RelaxedProblem:
         used = np.flatnonzero(quadratic.pp.diagonal() > 0)  # a side that no element uses has no say
         extra = LiftedTerm(sp.csc_matrix(quadratic.qq), sp.csc_matrix(sp.csc_matrix(quadratic.qp)[:, used]),
                            sp.csc_matrix(sp.csc_matrix(quadratic.pp)[used][:, used]))
-        return Derivatives(gradient, hessian, extra)
+        return Derivatives(gradient, hessian, extra, own)
 
 
 class AssignedProblem:

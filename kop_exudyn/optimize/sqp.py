@@ -11,6 +11,7 @@ import scipy.sparse as sp
 
 from ..errors import InputError, SimulationFailure
 from .constraints import check_feasible, validate_bounds
+from .curvature import SecantCorrection
 from .history import SQPState, StepRecord
 from .model import ModelStep, QuadraticModel, Region, build_model, minimise_model, nearest_feasible, projected_gradient
 from .problem import Derivatives, Point, Problem, block_sizes_of, scale_of
@@ -26,6 +27,8 @@ class SQPOptions:
     """Settings of ``minimise``.
 
     hessian : ``exact``, from the problem, or ``bfgs``
+    secant : correct the problem's Hessian by what it didn't predict (see curvature.py); for problems of few variables,
+        since every step teaches it one direction of each block
     max_steps : accepted steps, those before a resumption included
     max_trials : points evaluated in search of one step
     gradient_tolerance : stop when the projected gradient, in scaled variables, falls below this share of the larger
@@ -41,6 +44,7 @@ class SQPOptions:
     """
 
     hessian: str = "exact"
+    secant: bool = False
     max_steps: int = 200
     max_trials: int = 25
     gradient_tolerance: float = 1e-6
@@ -124,6 +128,8 @@ class _Run:
         self.qp, self.projection = QPSolver(options.qp), QPSolver(options.qp)
         sizes = block_sizes_of(problem)
         self.bfgs = BlockBFGS(sizes, self.region.scale) if options.hessian == "bfgs" else None
+        corrected = options.secant and options.hessian == "exact"
+        self.secant = SecantCorrection(sizes, self.region.scale) if corrected else None
         self.seconds: dict[str, float] = {}
 
     def solve(self, x0: np.ndarray, state: SQPState | None, start: Point | None) -> SQPResult:
@@ -159,8 +165,8 @@ class _Run:
         if state is None:
             n, m = self.region.n, self.region.constraints.rows
             state = SQPState(self._feasible_start(x0), self.options.radius, y=np.zeros(m), z=np.zeros(n))
-        elif self.bfgs is not None and state.quasi_newton:
-            self.bfgs.restore(state.quasi_newton)
+        elif state.quasi_newton and (self.bfgs or self.secant):
+            (self.bfgs or self.secant).restore(state.quasi_newton)
         if start is not None and np.array_equal(start.x, state.x):
             return state, start
         point = self._timed("evaluate", self.problem.evaluate, state.x.copy(), None)
@@ -194,7 +200,12 @@ class _Run:
             return build_model(point.x, replace(derivatives, extra=None), self.bfgs.matrix(), self.region)
         if derivatives.hessian is None:
             raise InputError("the problem gives no Hessian: choose 'bfgs'", field="hessian", value="exact")
-        return build_model(point.x, derivatives, sp.csc_matrix(derivatives.hessian), self.region)
+        hessian = sp.csc_matrix(derivatives.hessian)
+        if self.secant is not None:
+            own = derivatives.gradient if derivatives.own_gradient is None else derivatives.own_gradient
+            self.secant.observe(point.x, own, hessian)
+            hessian = hessian + self.secant.matrix()
+        return build_model(point.x, derivatives, hessian, self.region)
 
     def _step(self, point: Point, model: QuadraticModel, state: SQPState, norm: float):
         """The next accepted state and point, or the result when there is none."""
@@ -241,7 +252,7 @@ class _Run:
         return replace(
             state, x=trial.x.copy(), radius=_next_radius(radius, step, actual / step.predicted), step=state.step + 1,
             y=step.result.y, z=step.result.z[: self.region.n], history=(*state.history, record),
-            quasi_newton={} if self.bfgs is None else self.bfgs.to_arrays(),
+            quasi_newton=(self.bfgs or self.secant).to_arrays() if self.bfgs or self.secant else {},
         )
 
     def _stuck(self, state: SQPState, point: Point, trials: int, failures: int, last: str) -> SQPResult:

@@ -168,7 +168,7 @@ class Stages:
         assignment = restrict(start.assignment, self.dataset, members)
         problem = AssignedProblem(dataset, start.kit, assignment, self.settings.bounds)
         point = problem.point(start.kit.vector.copy(), [start.designs[n] for n in members])
-        options = SQPOptions(hessian=self.settings.hessian, max_steps=self.settings.assigned_steps,
+        options = SQPOptions(hessian=self.settings.hessian, secant=True, max_steps=self.settings.assigned_steps,
                              decrease_tolerance=self.settings.assigned_tolerance)
         result = self._sqp(name, problem, point, options, None)
         designs = list(start.designs)

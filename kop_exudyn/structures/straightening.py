@@ -6,8 +6,8 @@ assemble without stress, in the plane, with all joints where they were.
 
 Two tangents meet between their joints only if the span bends to one side. Where it doesn't (an inflection), or so
 unevenly that one half-piece would be very short, the directions of the strand's lines are changed as little as
-possible (least squares) until every corner lies ahead of one joint and behind the next, and no half-piece is shorter
-than a tenth of the other. Turning a line at a joint costs nothing: the hinge takes it up. The alternative, tangents
+possible (least squares) until every corner lies ahead of one joint and behind the next, with halves as even as that
+allows (0.6 of each other, or else 0.35, or 0.15). Turning a line at a joint costs nothing: the hinge takes it up. The alternative, tangents
 kept and the corner put at the chord's middle, leaves a misfit of the order of the span's turning that the rods would
 have to bend for; it is the fall-back where no such directions exist.
 """
@@ -22,6 +22,8 @@ from .network import Strand
 
 # Smallest ratio of a corner's two half-pieces.
 _LEAST_RATIO = 0.1
+# Ratios that are aimed at, the first feasible one is taken: even halves make elements that can share parts.
+_AIMED_RATIOS = (0.6, 0.35, 0.15)
 # A span that turns further than this can't be followed by one corner.
 _MOST_TURNING = np.radians(150.0)
 # Directions change by at most this, rad; beyond, the net would be another one.
@@ -57,8 +59,9 @@ def straighten(strand: Strand, joints: np.ndarray, field: str = "curve") -> Stra
         raise InputError(f"turns by {np.degrees(abs(strand.turnings[worst])):.0f} degrees between two joints: one "
                          "corner can't follow that; add joints", field=field)
     shift = np.zeros(len(strand.joints))
-    if not spans.proper(shift).all():
-        shift = _least_shift(spans, len(shift))
+    if not spans.proper(shift, _AIMED_RATIOS[0]).all():
+        shift = next((found for found in (_least_shift(spans, len(shift), ratio) for ratio in _AIMED_RATIOS)
+                      if found.any() and spans.proper(found).all()), shift)
     angles = strand.angles + shift
     following = np.append(angles[1:], angles[0] + strand.curve.lap_turning)[: strand.n_spans]
     lengths, exact = spans.half_lengths(shift)
@@ -93,11 +96,11 @@ class _Spans:
         """Both angles after turning the lines at the joints by shift (J,)."""
         return self.first + shift[self.start], self.second - shift[self.end]
 
-    def proper(self, shift: np.ndarray) -> np.ndarray:
-        """Whether each corner lies well between its joints (straight spans included)."""
+    def proper(self, shift: np.ndarray, ratio: float = _LEAST_RATIO) -> np.ndarray:
+        """Whether each corner lies well between its joints (straight spans included), its halves within a ratio."""
         a, b = self.moved(shift)
         small, large = np.minimum(np.abs(a), np.abs(b)), np.maximum(np.abs(a), np.abs(b))
-        return (large < _FLAT) | ((a * b > 0) & (small >= (1 - 1e-6) * _LEAST_RATIO * large) & (small + large < np.pi))
+        return (large < _FLAT) | ((a * b > 0) & (small >= (1 - 1e-6) * ratio * large) & (small + large < np.pi))
 
     def half_lengths(self, shift: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Half-pieces (m, 2) by the law of sines, the chord's halves where there is no proper corner; and where."""
@@ -109,7 +112,7 @@ class _Spans:
         return (self.chords * shares).T, exact
 
 
-def _least_shift(spans: _Spans, n_joints: int) -> np.ndarray:
+def _least_shift(spans: _Spans, n_joints: int, ratio: float) -> np.ndarray:
     """The smallest change (n_joints,) of the lines' directions that makes all corners proper; zero where none does.
 
     With the side sigma that each span is to bend to: sigma a >= r sigma b and sigma b >= r sigma a, linear in the
@@ -119,7 +122,6 @@ def _least_shift(spans: _Spans, n_joints: int) -> np.ndarray:
 
     a, b, side = spans.first, spans.second, _sides(spans, n_joints)
     rows, bounds = [], []
-    ratio = 1.5 * _LEAST_RATIO  # what is changed at all is moved clear of the limit
     for k, (start, end) in enumerate(zip(spans.start, spans.end)):
         for of_first, of_second in ((1.0, -ratio), (-ratio, 1.0)):
             row = np.zeros(n_joints)

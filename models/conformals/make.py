@@ -20,16 +20,16 @@ Map = Callable[[np.ndarray], np.ndarray]
 # Each map on the square [-1, 1]^2, where none of them has a singular or critical point; and the change of the mean joint
 # angle, rad: well past the bifurcation out of the plane, well before the next one.
 MAPS: dict[str, tuple[Map, float]] = {
-    "sinh": (lambda z: np.sinh(0.75 * z), 0.50),
-    "tanh": (lambda z: np.tanh(0.55 * z), 0.85),
-    "exp": (lambda z: np.exp((0.45 + 0.25j) * z), 0.90),
-    "cubic": (lambda z: z + (0.09 - 0.06j) * z**3, 0.50),
-    "sine": (lambda z: np.sin(0.7 * z + 0.35), 0.50),
-    "moebius": (lambda z: (z + 0.2) / (1 + (0.16 + 0.16j) * z), 0.90),
-    "log": (lambda z: np.log(z + 2.3 + 0.4j), 0.70),
-    "root": (lambda z: np.sqrt(z + 1.9 - 0.7j), 0.85),
-    "square": (lambda z: z + (0.12 + 0.08j) * z**2, 0.85),
-    "joukowski": (lambda z: (w := z + 2.5 + 0.6j) + 1.2 / w, 0.50),
+    "sinh": (lambda z: np.sinh(0.64 * z), 0.75),
+    "tanh": (lambda z: np.tanh(0.56 * z), 0.80),
+    "exp": (lambda z: np.exp(0.48 * z), 0.70),
+    "cubic": (lambda z: z + 0.077 * z**3, 0.50),
+    "sine": (lambda z: np.sin(0.72 * z), 0.50),
+    "moebius": (lambda z: z / (1 - 0.24 * z), 0.65),
+    "log": (lambda z: np.log(z + 2.75), 0.75),
+    "root": (lambda z: np.sqrt(z + 2.25), 0.90),
+    "square": (lambda z: z + 0.112 * z**2, 0.85),
+    "joukowski": (lambda z: (w := z + 3.0) + 1.875 / w, 0.60),
 }
 
 
