@@ -45,7 +45,8 @@ class SecantCorrection:
         image = self._times(k, step)
         known = float(step @ image)
         if known != 0.0:
-            share = min(1.0, abs(float(step @ missed)) / abs(known))
+            # halfway: sized down all the way, the error would be orthogonal to the step and the update void
+            share = 0.5 + 0.5 * min(1.0, abs(float(step @ missed)) / abs(known))
             self._factors[k] = share * self._factors[k]
             image = share * image
         error = missed - image
