@@ -61,7 +61,7 @@ def make_parser() -> argparse.ArgumentParser:
     for name in NAMES:
         command = import_module(f".commands.{name}", __package__)
         subparser = commands.add_parser(
-            name, parents=[verbosity], help=command.HELP, description=command.DESCRIPTION,
+            name.rstrip("_"), parents=[verbosity], help=command.HELP, description=command.DESCRIPTION,
             epilog=f"{command.EXAMPLES}\n\n{_STATUS}", formatter_class=argparse.RawDescriptionHelpFormatter)
         command.arguments(subparser)
         subparser.set_defaults(run=command.run)

@@ -4,4 +4,4 @@ A command is added by adding its module to NAMES. Modules import what they compu
 ``kop --help`` stays quick.
 """
 
-NAMES = ("simulate", "optimize")
+NAMES = ("simulate", "optimize", "import_")

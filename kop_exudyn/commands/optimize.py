@@ -38,19 +38,17 @@ def run(args: argparse.Namespace) -> int:
     from dataclasses import replace
 
     from ..io.designs import load_designs, select_files
-    from ..kit.kinds import part_kind
     from ..optimize.job import JobSettings
     from ..optimize.stages import StageSettings
     from ..report.environment import usable_cores
     from ..report.kit_run import optimize_kit
 
-    for kind in args.parts:
-        part_kind(kind)
+    parts = {_singular(kind): count for kind, count in args.parts.items()}
     stages = StageSettings(seed=args.seed)
     if args.max_steps is not None:
         stages = replace(stages, relaxed_steps=args.max_steps, assigned_steps=args.max_steps)
     result = optimize_kit(
-        load_designs(args.folder, args.designs), args.parts, out=args.out,
+        load_designs(args.folder, args.designs), parts, out=args.out,
         settings=JobSettings(stages=stages, jobs=args.jobs or usable_cores()),
         inputs=select_files(args.folder, args.designs), resume=args.resume, overwrite=args.overwrite,
         progress=not args.quiet)
@@ -59,3 +57,12 @@ def run(args: argparse.Namespace) -> int:
     if failed:
         sys.stderr.write(f"kop: these designs can't be built from the kit: {', '.join(failed)}\n")
     return 1 if failed else 0
+
+
+def _singular(kind: str) -> str:
+    """The kind's name; its plural is understood as well."""
+    from ..kit.kinds import kind_names, part_kind
+
+    name = kind[:-1] if kind.endswith("s") and kind[:-1] in kind_names() else kind
+    part_kind(name)
+    return name

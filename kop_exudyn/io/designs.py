@@ -7,6 +7,8 @@ from typing import Sequence
 
 from ..errors import InputError
 from ..structures.base import Design, design_from_dict
+from ..structures.umbrella import Umbrella
+from ..structures.umbrella_release import is_release
 from .documents import check_envelope, check_schema, has_schema
 from .json_files import read_json
 
@@ -15,11 +17,16 @@ _SUFFIXES = (".json", ".json.gz")
 
 
 def load_design(path: str | Path) -> Design:
-    """The design that a file describes.
+    """The design that a file describes: our own format, or a released umbrella mesh.
 
     Raises InputError naming the file, the field and the value when anything is wrong with it.
     """
     data = read_json(path)
+    if is_release(data):
+        try:
+            return Umbrella.from_release(data, str(path))
+        except InputError as error:
+            raise error.at(path) from None
     check_envelope(data, "design", DESIGN_VERSION, source=path)
     check_schema(data, "design", source=path)
     if has_schema(data["class"]):
