@@ -74,6 +74,7 @@ class ExudynModel:
     def __init__(self, scene: Scene):
         self.scene = scene
         self.layout = layout_of(scene)
+        self._length, self._force = _units_of(scene)
         self._container = exu.SystemContainer()
         self._mbs = self._container.AddSystem()
         with warnings.catch_warnings():
@@ -93,12 +94,12 @@ class ExudynModel:
         begin = perf_counter()
         scene = self.scene
         lengths = scene.rest_lengths(equilibrium.q)
-        reference = self.layout.reference_coordinates(scene, lengths)
+        reference = self._reference(lengths)
         with warnings.catch_warnings():
             _accept_rotation_markers()
             self._set_parameters(equilibrium, lengths, reference)
         force = np.abs(equilibrium.stress) / np.array([1, 1, 1] + 3 * [scene.length_scale])
-        force = max(float(force.max()), self._tiny)
+        force = max(float(force.max()) / self._force, self._tiny)
         allowed = max(_TOLERANCE * force, _ROUND_OFF * self._tiny)
         total = self._coordinates(equilibrium.state)
         for step in range(1, _MAX_STEPS + 1):
@@ -147,18 +148,18 @@ class ExudynModel:
         mbs, scene, layout = self._mbs, self.scene, self.layout
         lengths = scene.length_constant + np.where(scene.length_parameter >= 0, scene.length_scale, 0.0)
         self._nodes = [mbs.AddNode(item.NodeRigidBodyRotVecLG(referenceCoordinates=row.tolist()))
-                       for row in layout.reference_coordinates(scene, lengths)]
+                       for row in self._reference(lengths)]
         sections: dict[bytes, exu.BeamSection] = {}
         self._beams = []
         for (tail, head), K, L in zip(layout.element_nodes, scene.stiffness, lengths):
             key = K.tobytes()
             if key not in sections:
                 section = exu.BeamSection()
-                section.stiffnessMatrix = np.diag(K)
+                section.stiffnessMatrix = np.diag(K / self._force / np.repeat([1.0, self._length**2], 3))
                 section.inertia, section.massPerLength = np.eye(3), 1.0  # unused: statics
                 sections[key] = section
             self._beams.append(mbs.AddObject(item.ObjectBeamGeometricallyExact(
-                nodeNumbers=[self._nodes[tail], self._nodes[head]], length=L, sectionData=sections[key])))
+                nodeNumbers=[self._nodes[tail], self._nodes[head]], length=L / self._length, sectionData=sections[key])))
 
     def _add_joints(self) -> None:
         mbs, scene, layout = self._mbs, self.scene, self.layout
@@ -170,7 +171,7 @@ class ExudynModel:
         for key, node, frame, offset in layout.ties:
             carrier = layout.carriers[key]
             marker = self._marker(carrier.node) if not offset.any() else mbs.AddMarker(
-                item.MarkerBodyRigid(bodyNumber=self._bodies[carrier.node], localPosition=offset.tolist()))
+                item.MarkerBodyRigid(bodyNumber=self._bodies[carrier.node], localPosition=(offset / self._length).tolist()))
             mbs.AddObject(item.ObjectJointGeneric(
                 markerNumbers=[marker, self._marker(node)], constrainedAxes=[1] * 6,
                 rotationMarker0=carrier.frame.T, rotationMarker1=frame.T))
@@ -270,12 +271,19 @@ class ExudynModel:
         static.adaptiveStep = False
         static.newton.maxIterations = 1  # see _newton_step
         scene = self.scene
-        self._tiny = float(np.finfo(float).eps * scene.size * scene.stiffness[:, 0].max() / scene.length_scale)
+        largest = scene.stiffness[:, 0].max() / self._force
+        self._tiny = float(np.finfo(float).eps * scene.size * largest / scene.length_scale)
         static.newton.relativeTolerance = static.newton.absoluteTolerance = np.finfo(float).tiny
         settings.solution.file.write = False
         settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
         settings.linearSolver.reuseAnalyzedPattern = True
         return settings
+
+    def _reference(self, lengths: np.ndarray) -> np.ndarray:
+        """(n_nodes, 6) reference coordinates, in the model's units."""
+        coordinates = self.layout.reference_coordinates(self.scene, lengths)
+        coordinates[:, :3] /= self._length
+        return coordinates
 
     # -- values ----------------------------------------------------------------------------------------------------
     def _set_parameters(self, eq: Equilibrium, lengths: np.ndarray, reference: np.ndarray) -> None:
@@ -283,20 +291,20 @@ class ExudynModel:
         for node, row in zip(self._nodes, reference):
             mbs.SetNodeParameter(node, "referenceCoordinates", row.tolist())
         for beam, length in zip(self._beams, lengths):
-            mbs.SetObjectParameter(beam, "length", float(length))
+            mbs.SetObjectParameter(beam, "length", float(length / self._length))
         for joint, hinge, hub in self._turned:
             turn = rotation_z(eq.state.angles[hinge])
             mbs.SetObjectParameter(joint, "rotationMarker0", hub.frame.T @ turn)
         for ground, joint, body, turned in self._pins:
-            mbs.SetMarkerParameter(ground, "localPosition", eq.state.positions[body].tolist())
+            mbs.SetMarkerParameter(ground, "localPosition", (eq.state.positions[body] / self._length).tolist())
             if turned:
                 mbs.SetObjectParameter(joint, "rotationMarker0", eq.state.rotations[body])
         if scene.actuated is not None:
-            per_hinge = eq.torque / len(scene.actuated)
+            per_hinge = eq.torque / (self._force * self._length) / len(scene.actuated)
             for load, axis in self._torques:
                 mbs.SetLoadParameter(load, "loadVector", (per_hinge * axis).tolist())
         if self._weights:
-            share = 0.5 * lengths[:, None] * scene.weight
+            share = 0.5 * lengths[:, None] * scene.weight / self._force
             force = np.zeros((layout.n_nodes, 3))
             np.add.at(force, layout.element_nodes[:, 0], share)
             np.add.at(force, layout.element_nodes[:, 1], share)
@@ -314,26 +322,29 @@ class ExudynModel:
             np.subtract.at(total, term.dofs, g)
             for springs in (springs for owner, springs in self._springs if owner is term):
                 self._set_springs(springs, H, state)
+        total /= self._force
         for body, hub, force, torque in self._wrenches:
-            part = total[6 * body: 6 * body + 6]
+            part = total[6 * body: 6 * body + 6] / np.repeat([1.0, self._length], 3)
             self._mbs.SetLoadParameter(force, "loadVector", part[:3].tolist())
             self._mbs.SetLoadParameter(torque, "loadVector", (hub.frame.T @ part[3:]).tolist())
         for hinge, load, axis in self._hinge_wrenches:
-            self._mbs.SetLoadParameter(load, "loadVector", (total[6 * scene.n_bodies + hinge] * axis).tolist())
+            self._mbs.SetLoadParameter(load, "loadVector", (total[6 * scene.n_bodies + hinge] / self._length * axis).tolist())
 
     def _set_springs(self, springs: list[tuple[object, int, int]], hessians: np.ndarray, state: State) -> None:
         """Connectors' stiffness from the second derivatives (m, 12, 12) of what acts between the two bodies.
 
         Seen from the first body's axes, the second one moves by R_0 dx and turns by R_0 theta.
         """
+        unit = np.repeat([self._length, 1.0], 3)
         for (connector, first, second), H in zip(springs, hessians):
             R0, R1 = state.rotations[first], state.rotations[second]
             change = np.zeros((6, 6))
             change[:3, :3], change[3:, 3:] = R0, R1.T @ R0
             offset = np.zeros(6)
-            offset[:3] = R0.T @ (state.positions[second] - state.positions[first])
+            offset[:3] = R0.T @ (state.positions[second] - state.positions[first]) / self._length
             frame = self.layout.carriers[second, -1].frame
-            self._mbs.SetObjectParameter(connector, "stiffness", change.T @ H[6:, 6:] @ change)
+            stiffness = H[6:, 6:] * np.outer(unit, unit) / (self._force * self._length)
+            self._mbs.SetObjectParameter(connector, "stiffness", change.T @ stiffness @ change)
             self._mbs.SetObjectParameter(connector, "offset", offset.tolist())
             self._mbs.SetObjectParameter(connector, "rotationMarker1", frame.T @ R1.T @ R0)
 
@@ -344,10 +355,11 @@ class ExudynModel:
         beams = layout.scene_node >= 0
         out = np.zeros((layout.n_nodes, 6))
         out[beams, :3], out[beams, 3:] = x[layout.scene_node[beams]], log_so3(R[layout.scene_node[beams]])
+        out[beams, :3] /= self._length
         for carrier in layout.carriers.values():
             if carrier.rigid:
                 turn = rotation_z(state.angles[carrier.hinge]) if carrier.hinge >= 0 else np.eye(3)
-                out[carrier.node, :3] = state.positions[carrier.body]
+                out[carrier.node, :3] = state.positions[carrier.body] / self._length
                 out[carrier.node, 3:] = log_so3(state.rotations[carrier.body] @ turn)
         return out
 
@@ -357,7 +369,7 @@ class ExudynModel:
         positions, rotations, angles = near.positions.copy(), near.rotations.copy(), near.angles.copy()
         for (body, hinge), carrier in self.layout.carriers.items():
             if hinge < 0:
-                positions[body] = solution[carrier.node, :3]
+                positions[body] = solution[carrier.node, :3] * self._length
                 rotations[body] = R[carrier.node] @ carrier.frame.T
         for (body, hinge), carrier in self.layout.carriers.items():
             if hinge >= 0:
@@ -365,6 +377,16 @@ class ExudynModel:
                 measured = np.arctan2(turn[1, 0], turn[0, 0])
                 angles[hinge] += np.remainder(measured - near.angles[hinge] + np.pi, 2 * np.pi) - np.pi
         return State(positions, rotations, angles)
+
+
+def _units_of(scene: Scene) -> tuple[float, float]:
+    """The model's units of length and force: those of a rod element, L and EI / L^2, rounded to powers of two.
+
+    Forces and joint equations share one system of equations and one residual, so they have to be of similar size
+    whatever the units of the scene. Powers of two cost no digit.
+    """
+    length = 2.0 ** round(np.log2(scene.length_scale))
+    return length, 2.0 ** round(np.log2(np.median(scene.stiffness[:, 4:].min(axis=1)) / length**2))
 
 
 def _accept_rotation_markers() -> None:
