@@ -19,6 +19,7 @@ from ..errors import SimulationFailure
 from ..scene.assembly import ENERGY
 from ..scene.state import State
 from .direction import border_of, bordered_solve, factorise_convex, is_convex, shift_unit
+from .softened import softened
 from .system import Energy, System
 
 log = logging.getLogger(__name__)
@@ -39,6 +40,8 @@ class NewtonOptions:
     patience : mixed iterations without headway before the best state returns and steps become shorter
     escapes : how many saddles are left before the solve is given up
     escape_rotation : rad, largest rotation of the first move away from a saddle
+    soften : when a start without stress (one that no earlier solve led to) brings nothing, solve with rods that are
+        soft along their axis first (see softened.py)
     side : (n_free,) vector; where the two ways off a saddle are equivalent, the one with positive product is taken
     """
 
@@ -49,6 +52,7 @@ class NewtonOptions:
     patience: int = 8
     escapes: int = 6
     escape_rotation: float = 0.05
+    soften: bool = True
     side: np.ndarray | None = None
 
 
@@ -134,7 +138,23 @@ def solve(
         start = start.start
     elif not isinstance(start, Start):
         start = Start(start if start is not None else system.scene.initial)
-    return _Run(system, q, start, opening, options).solve()
+    try:
+        return _Run(system, q, start, opening, options).solve()
+    except SimulationFailure as failure:
+        if start.stress is not None or not options.soften:
+            raise
+        try:
+            return _solve_softened_first(system, q, start, opening, replace(options, soften=False))
+        except SimulationFailure:
+            raise failure from None
+
+
+def _solve_softened_first(
+    system: System, q: np.ndarray, start: Start, opening: float | None, options: NewtonOptions
+) -> Equilibrium:
+    """The equilibrium that is reached by way of that of the softened scene."""
+    softer = solve(System(softened(system.scene, q)), q, start, opening, options)
+    return _Run(system, q, Start(softer.state, softer.torque), opening, options).solve().after(softer)
 
 
 @dataclass
@@ -173,7 +193,11 @@ class _Run:
                     self.system.predicted_stress[:] = self.system.stress()
                     converged = self._mixed()
             energy = self.system.assemble(self.state)
-            residual, _ = self.residual()
+            residual, gap = self.residual()
+            if not self._converged(residual, gap):
+                # accepted at a trial state's larger forces
+                converged = False
+                continue
             negative = self.system.factorise()
             border = border_of(self.system)
             if is_convex(negative, border):
@@ -200,6 +224,7 @@ class _Run:
         system, options = self.system, self.options
         best: _Best | None = None
         cap, floor, since, returns = options.rotation_cap, 0.0, 0, 0
+        counted = True
         while True:
             energy = system.assemble(self.state, mixed=True)
             residual, gap = self.residual()
@@ -212,7 +237,7 @@ class _Run:
                 best = _Best(self.state, self.torque, system.predicted_stress.copy(), value, merit, abs(gap))
                 since = 0
             else:
-                since += 1
+                since += counted
                 if best is None:
                     return False
                 if since > options.patience or not np.isfinite(value):
@@ -227,6 +252,8 @@ class _Run:
             self.shift, border = factorise_convex(system, max(floor, self.shift / 16))
             step, change = bordered_solve(system, border, -residual, -gap)
             scale = self._capped(step, cap)
+            # without a potential nothing tells whether a shortened step leads ahead: a roll-up needs many of them
+            counted = scale == 1.0 or system.conservative
             if since == 0:
                 best.slope = scale * float(residual @ step)
             system.predict_stress(scale * step)
