@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import SimulationFailure
 from .system import System
 
 _SHIFT_START = 1e-6  # of the median rotational stiffness; a soft mode of a large structure is about that soft
@@ -34,7 +35,7 @@ def factorise_convex(system: System, shift: float = 0.0) -> tuple[float, Border 
         if base is None:
             base = shift_unit(system)
         shift = max(_SHIFT_GROWTH * shift, base)
-    raise FloatingPointError("no shift makes the stiffness positive definite")
+    raise SimulationFailure("no shift makes the stiffness positive definite")
 
 
 def shift_unit(system: System) -> float:
@@ -47,6 +48,8 @@ def border_of(system: System) -> Border | None:
     """K^-1 c with the factorisation at hand, or None without actuation."""
     if system.constraint is None:
         return None
+    if system.singular:
+        return Border(np.full(system.n_unknowns, np.nan), 0.0)
     column = system.solve(system.constraint)
     return Border(column, float(system.constraint @ column))
 

@@ -36,6 +36,11 @@ class Factorisation:
         self.pivots = self._factors[1]
         return int(np.count_nonzero(~(self.pivots > 0)))
 
+    @property
+    def singular(self) -> bool:
+        """Whether the last update met an exactly zero pivot: there is nothing to solve with."""
+        return self._solver is None
+
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """Solve for one right-hand side (n,) or for many (n, k)."""
         if rhs.ndim == 1:

@@ -71,6 +71,11 @@ class System:
         """Whether a potential exists (a spatial moment has none)."""
         return all(getattr(term, "conservative", True) for term in self.scene.terms)
 
+    @property
+    def singular(self) -> bool:
+        """Whether the last factorisation met an exactly zero pivot, so that nothing can be solved with it."""
+        return self.factorisation.singular
+
     def set_parameters(self, q: np.ndarray) -> None:
         """Take the rest lengths of q; raises SimulationFailure unless they are positive."""
         self.lengths = self.scene.rest_lengths(q)
