@@ -16,13 +16,14 @@ from .stages import Observer, StageResult, Stages, StageSettings, Store
 class JobSettings:
     """What a run is made with.
 
-    weights : of the objective's terms; design_weights : how much each design counts (default: all the same)
+    weights : of the objective's terms, default: the fit weight that suits the designs' class, see `Design.fit_weight`
+    design_weights : how much each design counts (default: all the same)
     stages : settings of the stages
     jobs : processes
     baselines : also compute the unrelaxed baseline
     """
 
-    weights: Weights = Weights()
+    weights: Weights | None = None
     design_weights: tuple[float, ...] | None = None
     stages: StageSettings = StageSettings()
     jobs: int = 2
@@ -54,7 +55,8 @@ def run_job(
     with DesignPool(designs, settings.jobs) as pool:
         announce("input designs")
         pool.prepare()
-        dataset = Dataset.of_pool(pool, settings.weights, settings.design_weights)
+        weights = settings.weights or Weights(fit=max(design.fit_weight for design in designs))
+        dataset = Dataset.of_pool(pool, weights, settings.design_weights)
         stages = Stages(dataset, parts, settings.stages, store, observer)
         outcome = JobOutcome(pool.references)
         found = outcome.stages

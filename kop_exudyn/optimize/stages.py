@@ -49,7 +49,8 @@ class NoStore:
 class StageSettings:
     """Settings of the stages.
 
-    schedule : values of w_c, one after the other
+    schedule : values of w_c, one after the other; default: 0.1, 1, 10 and 100 times the weight of the fit, so that
+        the balance of fit and projection is the same whatever the weights
     tight : largest rms distance of elements to their parts, relative to the kind's scale, at which raising w_c ends
     relaxed_steps, assigned_steps : accepted SQP steps at most, for each w_c and for the assigned stage
     relaxed_tolerance, last_tolerance, assigned_tolerance : the rounds of the relaxed stage before the last, the last
@@ -62,12 +63,12 @@ class StageSettings:
     hessian : "exact" or "bfgs"
     """
 
-    schedule: tuple[float, ...] = (1e3, 1e4, 1e5, 1e6)
+    schedule: tuple[float, ...] | None = None
     tight: float = 1e-3
     relaxed_steps: int = 25
     assigned_steps: int = 40
-    relaxed_tolerance: float = 5e-3
-    last_tolerance: float = 1e-3
+    relaxed_tolerance: float = 3e-3
+    last_tolerance: float = 5e-4
     assigned_tolerance: float = 1e-4
     path_steps: int = 10
     rescues: int = 2
@@ -122,6 +123,9 @@ class Stages:
 
     def __init__(self, dataset: Dataset, parts: Mapping[str, int], settings: StageSettings = StageSettings(),
                  store: Store | None = None, observer: Observer | None = None):
+        if settings.schedule is None:
+            weights = dataset.weights
+            settings = replace(settings, schedule=tuple(k * (weights.fit or weights.energy) for k in (0.1, 1, 10, 100)))
         self.dataset, self.parts, self.settings = dataset, dict(parts), settings
         self.store, self.observer = store or NoStore(), observer or (lambda event: None)
         self.q0 = dataset.parameters

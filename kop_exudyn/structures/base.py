@@ -79,6 +79,9 @@ class Design(ABC):
     """
 
     class_name: ClassVar[str]
+    # Weight of the fit in the objective, against 0.02 for the energy, that suits the class: stiff structures whose
+    # shape hardly depends on their parts need more of it, those with many soft modes less.
+    fit_weight: ClassVar[float] = 1e4
     name: str
     parameters: np.ndarray
     lower: np.ndarray

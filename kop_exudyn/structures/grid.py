@@ -41,6 +41,7 @@ class Grid(Design):
     """
 
     class_name = "grid"
+    fit_weight = 1e5
     roles = (Role("deployed", fitted=True),)
 
     def __init__(self, name: str, surface: Surface, network: CurveNetwork, section: Section, material: Material, *,
