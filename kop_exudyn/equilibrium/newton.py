@@ -27,6 +27,9 @@ log = logging.getLogger(__name__)
 _QUICK = 2  # headway within so many further steps: the steps may grow again
 _MAX_RETURNS = 8  # to the best state, before energy descent takes over
 _FLOOR_FACTOR = 30.0
+_BENT_TOO_FAR = 2.5  # rad from one end of an element to the other; at pi its strain measure ends
+# Shifted steps in a row, and the relative residual, after which an iteration is taken to be creeping up to a saddle.
+_LINGERING, _NEAR = 20, 1e-2
 
 
 @dataclass(frozen=True)
@@ -224,7 +227,7 @@ class _Run:
         system, options = self.system, self.options
         best: _Best | None = None
         cap, floor, since, returns = options.rotation_cap, 0.0, 0, 0
-        counted = True
+        counted, shifted = True, 0
         while True:
             energy = system.assemble(self.state, mixed=True)
             residual, gap = self.residual()
@@ -250,6 +253,11 @@ class _Run:
                     continue
             self._check_budget()
             self.shift, border = factorise_convex(system, max(floor, self.shift / 16))
+            shifted = shifted + 1 if self.shift > floor else 0
+            if shifted > _LINGERING and self.relative(residual) < _NEAR and self._unstable_here():
+                # symmetry keeps the residual off the unstable mode, whose shift makes the other modes converge slowly
+                best, since, shifted = None, 0, 0
+                continue
             step, change = bordered_solve(system, border, -residual, -gap)
             scale = self._capped(step, cap)
             # without a potential nothing tells whether a shortened step leads ahead: a roll-up needs many of them
@@ -312,6 +320,14 @@ class _Run:
                 return scale
             scale *= 0.5
         return 0.0
+
+    def _unstable_here(self) -> bool:
+        """Whether the stiffness at the state itself is indefinite; the state is then left along its softest mode."""
+        energy = self.system.assemble(self.state)
+        if is_convex(self.system.factorise(), border_of(self.system)):
+            return False
+        self._leave_saddle(energy)
+        return True
 
     def _leave_saddle(self, energy: Energy) -> None:
         """Move downhill along the softest mode of an unstable equilibrium."""
@@ -398,8 +414,18 @@ class _Run:
 
     def _check_budget(self) -> None:
         if self.iterations >= self.options.max_iterations:
-            raise SimulationFailure(f"no equilibrium within {self.options.max_iterations} Newton iterations")
+            raise SimulationFailure(f"no equilibrium within {self.options.max_iterations} Newton iterations"
+                                    f"{self._bent_too_far()}")
         self.iterations += 1
+
+    def _bent_too_far(self) -> str:
+        """A hint where an element bends or twists so far that its strain is about to be undefined, else nothing."""
+        system = self.system
+        turns = np.linalg.norm(
+            system.strain[:, 3:] + system.lengths[:, None] * system.scene.rest_strain[:, 3:], axis=1)
+        worst = int(np.argmax(turns))
+        return f": element {worst} turns by {turns[worst]:.2f} rad, divide its rod more finely" if (
+            turns[worst] > _BENT_TOO_FAR) else ""
 
 
 def refine(system: System, equilibrium: Equilibrium, steps: int = 3) -> Equilibrium:
