@@ -6,6 +6,7 @@ import logging
 import os
 import sys
 from importlib import import_module
+from keyword import iskeyword
 from typing import NoReturn, Sequence
 
 from . import __version__
@@ -59,9 +60,9 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"kop_exudyn {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in NAMES:
-        command = import_module(f".commands.{name}", __package__)
+        command = import_module(f".commands.{name}{'_' if iskeyword(name) else ''}", __package__)
         subparser = commands.add_parser(
-            name.rstrip("_"), parents=[verbosity], help=command.HELP, description=command.DESCRIPTION,
+            name, parents=[verbosity], help=command.HELP, description=command.DESCRIPTION,
             epilog=f"{command.EXAMPLES}\n\n{_STATUS}", formatter_class=argparse.RawDescriptionHelpFormatter)
         command.arguments(subparser)
         subparser.set_defaults(run=command.run)

@@ -1,7 +1,7 @@
 """Subcommands of ``kop``, one module each: HELP, DESCRIPTION, EXAMPLES, `arguments(parser)` and `run(args) -> status`.
 
-A command is added by adding its module to NAMES. Modules import what they compute with inside `run`, so that
+A command is added by adding its module to NAMES; a module whose name would be a keyword ends in an underscore. Modules import what they compute with inside `run`, so that
 ``kop --help`` stays quick.
 """
 
-NAMES = ("simulate", "optimize", "import_")
+NAMES = ("simulate", "optimize", "import")
