@@ -1,0 +1,1 @@
+"""Tools that try to break the rest: seeded random structures, mutated files, and judges that trust nobody."""
