@@ -27,7 +27,8 @@ _GROWTH, _EASY, _HARD = 1.5, 5, 8  # iterations after which steps grow, and afte
 _SMALLEST = 1e-6  # of the largest step: below it the path is lost
 _SMOOTH = 0.3  # rad that the tangent, and share of its largest value that the factor's rate, may change by in a step
 _SHARPEST = 1e-3  # of the largest step: below it such changes are taken for a corner of the path
-_BISECTIONS = 26
+_BISECTIONS = 40
+_LOCATED = 1e-7  # relative, of the factor at a critical point: closer to it the tangents are noise
 
 
 @dataclass(frozen=True)
@@ -255,33 +256,43 @@ class _Tracer:
 
     # -- critical points -------------------------------------------------------------------------------------------
     def _critical_between(self, point: PathPoint, ahead: PathPoint, step: float) -> list[CriticalPoint]:
-        """All critical points on a step, by bisection of its length on what changes there."""
+        """All critical points on a step, by bisection of its length on what differs between its ends.
+
+        What doesn't differ there is not looked at: next to a singular stiffness the tangent's signs are noise.
+        """
+        differs = [a != b for a, b in zip(point.signature, ahead.signature)]
+
+        def signature(of: PathPoint) -> list:
+            return [value for value, counts in zip(of.signature, differs) if counts]
+
         found: list[CriticalPoint] = []
         low, before = 0.0, point
-        while before.signature != ahead.signature:
+        while signature(before) != signature(ahead):
             high, behind = step, ahead
             for _ in range(_BISECTIONS):
                 middle, _ = self._advance(point, 0.5 * (low + high))
                 if middle is None:
                     break
-                if middle.signature == before.signature:
-                    low = 0.5 * (low + high)
+                if signature(middle) == signature(before):
+                    low, before = 0.5 * (low + high), middle
                 else:
                     high, behind = 0.5 * (low + high), middle
-            found.append(self._critical(before, behind))
+                if high - low < 1e-3 * step and abs(behind.factor - before.factor) <= _LOCATED * abs(behind.factor):
+                    break
+            found.append(self._critical(before, behind, differs))
             low, before = high, behind
         return found
 
-    def _critical(self, before: PathPoint, behind: PathPoint) -> CriticalPoint:
-        changed = [a != b for a, b in zip(before.signature, behind.signature)]
-        if not changed[0] and not changed[1]:
+    def _critical(self, before: PathPoint, behind: PathPoint, differs: list[bool]) -> CriticalPoint:
+        count, factor, _ = (a != b and counts for a, b, counts in zip(before.signature, behind.signature, differs))
+        if not count and not factor:
             return CriticalPoint("turning", behind, behind.tangent / np.abs(behind.tangent).max())
         self._point(behind.state, behind.factor, None)
         mode = np.sin(np.arange(1, self.system.n_unknowns + 1) * 0.7390851)  # without symmetry, and reproducible
         for _ in range(4):
             mode = self.system.solve(self.system.metric * mode)
             mode /= mode[np.argmax(np.abs(mode))]
-        return CriticalPoint("limit" if changed[1] else "bifurcation", behind, mode)
+        return CriticalPoint("limit" if factor else "bifurcation", behind, mode)
 
 
 def _reversed(point: PathPoint) -> PathPoint:
