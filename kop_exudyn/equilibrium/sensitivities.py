@@ -160,7 +160,9 @@ class Sensitivities:
     @cached_property
     def trusted(self) -> bool:
         """Whether the factorisation is good enough for derivatives: False close to a bifurcation or limit point."""
-        probe = np.asarray(self._residual_q[: self._n].sum(axis=1)).ravel()
+        # columns in uneven shares: in a plain sum those of symmetric parameters could cancel out of the softest mode
+        shares = 1.0 + 0.5 * np.sin(np.arange(1, self._residual_q.shape[1] + 1) * 0.7390851)
+        probe = self._residual_q[: self._n] @ shares
         size = np.abs(probe).max(initial=0.0)
         if size == 0.0:
             return True
