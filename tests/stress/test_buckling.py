@@ -127,4 +127,5 @@ def test_twisted_ring(rods):
     path = trace(scene, rods.none, HingeTorques(hinge, 1.0, scene.n_bodies), stop=lambda p: p.factor > 1.9,
                  options=PathOptions(rotation=0.3))
     assert first_bifurcation(path) == pytest.approx(np.sqrt(3) * EI, rel=3e-3)
-    assert all(np.abs(p.state.positions[:, 2]).max() < 1e-6 for p in path.points if p.factor < 1.7)
+    # twisted and bent elements are helices, which tilts the ring against the joint by O(h^2): no further than that
+    assert all(np.abs(p.state.positions[:, 2]).max() < 3e-3 for p in path.points if p.factor < 1.8)
