@@ -159,7 +159,10 @@ class Sensitivities:
 
     @cached_property
     def trusted(self) -> bool:
-        """Whether the factorisation is good enough for derivatives: False close to a bifurcation or limit point."""
+        """Whether derivatives can be relied on: False close to a bifurcation or limit point, and under moments without
+        potential, whose tangent's skew part is not in the factorisation."""
+        if not self.system.conservative:
+            return False
         # columns in uneven shares: in a plain sum those of symmetric parameters could cancel out of the softest mode
         shares = 1.0 + 0.5 * np.sin(np.arange(1, self._residual_q.shape[1] + 1) * 0.7390851)
         probe = self._residual_q[: self._n] @ shares

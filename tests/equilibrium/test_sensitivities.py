@@ -7,6 +7,7 @@ import pytest
 from kop_exudyn.equilibrium.newton import NewtonOptions, refine, solve
 from kop_exudyn.equilibrium.sensitivities import Sensitivities
 from kop_exudyn.equilibrium.system import System
+from kop_exudyn.scene.loads import SpatialMoments
 
 EXACT = NewtonOptions(tolerance=1e-12)
 CASES = [{}, {"weight": False}, {"terms": False}, {"actuated": False}, {"weight": False, "terms": False}]
@@ -134,3 +135,10 @@ def test_one_adjoint_costs_one_solve_and_no_assembly(solved):
 
 def test_trusted_where_the_stiffness_is_well_conditioned(solved):
     assert solved.sensitivities.trusted
+
+
+def test_not_trusted_under_moments_without_potential(strut):
+    """Their tangent is not symmetric: derivatives would be wrong by some per cent."""
+    scene = strut().with_terms(SpatialMoments([8], [0.1, 0.3, 0.2]))
+    system = System(scene)
+    assert not Sensitivities(system, solve(system, np.zeros(0))).trusted
