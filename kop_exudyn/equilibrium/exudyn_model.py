@@ -392,3 +392,30 @@ def _units_of(scene: Scene) -> tuple[float, float]:
 def _accept_rotation_markers() -> None:
     """Let joints and connectors be given the rotation of their markers, which 1.12.244 and later advise against."""
     warnings.simplefilter("ignore", DeprecationWarning)
+
+
+def solve_alone(scene: Scene, q: np.ndarray, iterations: int = 50) -> dict[str, float | int | str]:
+    """Exudyn's static solver by itself, from the scene's initial state: what the fast solver is measured against.
+
+    For scenes without actuation and terms. Returns seconds and iterations, or why it stopped, as plain data.
+    """
+    model = ExudynModel(scene)
+    lengths = scene.rest_lengths(q)
+    reference = model._reference(lengths)
+    state = scene.with_driven(scene.initial, q)
+    start = Equilibrium(state=state, q=q, opening=None, torque=0.0, stress=np.zeros((len(lengths), 6)),
+                        elastic_energy=0.0, potential=0.0, iterations=0, residual=0.0, escapes=0, wall_s=0.0)
+    with warnings.catch_warnings():
+        _accept_rotation_markers()
+        model._set_parameters(start, lengths, reference)
+    data = model._mbs.systemData
+    data.SetODE2Coordinates((model._coordinates(state) - reference).ravel(), configuration=exu.ConfigurationType.Initial)
+    static = model._settings.staticSolver
+    static.newton.maxIterations, static.newton.relativeTolerance = iterations, 1e-8
+    solver, begin = exu.MainSolverStatic(), perf_counter()
+    try:
+        converged = solver.SolveSystem(model._mbs, model._settings)
+    except Exception as error:  # Exudyn raises its own types
+        return {"iterations": f"failed: {str(error).splitlines()[0][:80]}", "seconds": perf_counter() - begin}
+    steps = int(solver.it.newtonSteps)
+    return {"iterations": steps if converged else f"not converged within {iterations}", "seconds": perf_counter() - begin}
