@@ -2,6 +2,8 @@
 from __future__ import annotations
 
 import io
+import math
+import tokenize
 import zipfile
 import zlib
 from pathlib import Path
@@ -37,13 +39,27 @@ def load_arrays(path: str | Path, limit: int = SIZE_LIMIT) -> dict[str, np.ndarr
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             if sum(entry.file_size for entry in archive.infolist()) > limit:
                 raise InputError(f"unpacks to more than {limit / 2**20:g} MB", source=path)
-            return {entry.removesuffix(".npy"): _read(archive, entry) for entry in archive.namelist()}
-    except (zipfile.BadZipFile, zlib.error, EOFError, ValueError, NotImplementedError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"not a readable file of arrays: {error}", source=path) from None
+            return {entry.filename.removesuffix(".npy"): _read(archive, entry) for entry in archive.infolist()}
+    except InputError:
+        raise
+    except (zipfile.BadZipFile, zlib.error, EOFError, ValueError, NotImplementedError, RuntimeError, TypeError,
+            SyntaxError, tokenize.TokenError) as error:  # the last three: numpy's reader of damaged headers
+        raise InputError(f"not a readable file of arrays: {_one_line(error)}", source=path) from None
 
 
-def _read(archive: zipfile.ZipFile, entry: str) -> np.ndarray:
-    with archive.open(entry) as stream:
-        return np.lib.format.read_array(stream, allow_pickle=False)
+def _read(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> np.ndarray:
+    content = archive.read(entry)
+    stream = io.BytesIO(content)
+    version = np.lib.format.read_magic(stream)
+    if version != (1, 0):
+        raise ValueError(f"array format {version[0]}.{version[1]}")
+    shape, _, dtype = np.lib.format.read_array_header_1_0(stream)
+    # before anything of that size is allocated
+    if math.prod(shape) * dtype.itemsize != len(content) - stream.tell():
+        raise ValueError(f"the array {entry.filename} isn't of the size that it claims")
+    stream.seek(0)
+    return np.lib.format.read_array(stream, allow_pickle=False)
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())[:120]

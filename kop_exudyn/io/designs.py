@@ -9,7 +9,7 @@ from ..errors import InputError
 from ..structures.base import Design, design_from_dict
 from ..structures.umbrella import Umbrella
 from ..structures.umbrella_release import is_release
-from .documents import check_envelope, check_schema, has_schema
+from .documents import check_envelope, check_range, check_schema, has_schema
 from .json_files import read_json
 
 DESIGN_VERSION = 1
@@ -22,6 +22,7 @@ def load_design(path: str | Path) -> Design:
     Raises InputError naming the file, the field and the value when anything is wrong with it.
     """
     data = read_json(path)
+    check_range(data, source=path)
     if is_release(data):
         try:
             return Umbrella.from_release(data, str(path))

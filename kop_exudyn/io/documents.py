@@ -9,6 +9,8 @@ from typing import Any, Mapping
 
 from ..errors import InputError
 
+_LONGEST = 160  # characters of a message that quotes what it found
+_LARGEST = 1e60
 _PREFIX = "urn:kop_exudyn:"
 _TYPES = {"object": "an object", "array": "a list", "string": "a text", "number": "a number", "integer": "an integer",
           "boolean": "true or false", "null": "null"}
@@ -41,6 +43,24 @@ def check_schema(data: Any, schema: str, source: Any = None) -> None:
     error = best_match(_validator(schema).iter_errors(data))
     if error is not None:
         raise _as_input_error(error, source)
+
+
+def check_range(data: Any, source: Any = None) -> None:
+    """Raise InputError for a number beyond 1e60, whose powers would leave the range of double precision."""
+    waiting: list[tuple[list[str | int], Any]] = [([], data)]
+    while waiting:
+        path, value = waiting.pop()
+        if isinstance(value, Mapping):
+            waiting += [([*path, key], item) for key, item in value.items()]
+        elif isinstance(value, list):
+            waiting += [([*path, k], item) for k, item in enumerate(value)]
+        elif isinstance(value, (int, float)) and not -_LARGEST <= value <= _LARGEST:
+            raise InputError("is out of range", source=source, field=dotted(path), value=_shown(value))
+
+
+def _shown(value: int | float) -> str | float:
+    """The number, or words for an integer, which has more than sixty digits here."""
+    return value if isinstance(value, float) else f"an integer of {len(str(abs(value)))} digits"
 
 
 def has_schema(schema: str) -> bool:
@@ -103,7 +123,7 @@ def _message(error: Any) -> str:
         return f"must have at {'least' if error.validator == 'minItems' else 'most'} {limit} entries"
     if error.validator == "minLength":
         return "must not be empty"
-    return error.message
+    return error.message if len(error.message) <= _LONGEST else f"{error.message[:_LONGEST]}..."
 
 
 def _known_fields(error: Any) -> set[str]:

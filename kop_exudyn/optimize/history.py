@@ -6,6 +6,8 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
+from ..errors import InputError
+
 
 @dataclass(frozen=True)
 class StepRecord:
@@ -70,7 +72,14 @@ class SQPState:
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray]) -> SQPState:
-        """The state that ``to_arrays`` came from, bit for bit."""
+        """The state that ``to_arrays`` came from, bit for bit. Raises InputError for arrays of something else."""
+        try:
+            return cls._from_arrays(arrays)
+        except (KeyError, TypeError, ValueError) as error:  # ValueError: also that of the JSON reader
+            raise InputError(f"not the state of an optimisation ({type(error).__name__})", field="sqp") from None
+
+    @classmethod
+    def _from_arrays(cls, arrays: dict[str, np.ndarray]) -> SQPState:
         radius, step, evaluations, failures, gradient_scale = arrays["numbers"]
         quasi_newton = {
             name.removeprefix("quasi_newton."): np.array(arrays[name])

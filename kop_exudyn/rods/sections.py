@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 
+_LARGEST = 1e60  # its fourth power is still a number
 # Odd terms of the torsion series; the remainder of n terms falls with n^-5, so this many reach round-off.
 _TORSION_TERMS = np.arange(1, 400, 2)
 
@@ -153,5 +154,5 @@ def material_from_dict(data: Mapping[str, Any]) -> Material:
 
 
 def _positive(field: str, value: float) -> None:
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.floating, np.integer)) or not 0 < value < np.inf:
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.floating, np.integer)) or not 0 < value < _LARGEST:
         raise InputError("must be a positive number", field=field, value=value)

@@ -106,8 +106,9 @@ def _rods(read: _Fields, labels: np.ndarray, own: np.ndarray, n: int) -> tuple[U
         rods, shifts = read.listed(f"{letter}_segments", n), read.listed(f"midpoint_offsets_{letter}", n)
         for k in range(n):
             where = f"{letter}_segments[{k}]"
-            shift = read.values(shifts[k], (len(rods[k]), 3), float, f"midpoint_offsets_{letter}[{k}]")
-            for rod, offset in zip(read.values(rods[k], (None,), int, where, upper=m), shift):
+            own_rods = read.values(rods[k], (None,), int, where, upper=m)
+            shift = read.values(shifts[k], (len(own_rods), 3), float, f"midpoint_offsets_{letter}[{k}]")
+            for rod, offset in zip(own_rods, shift):
                 ends = np.flatnonzero(joints[rod] == k)
                 if len(ends) != 1:
                     raise read.error(where, "names a rod that doesn't end at this joint", int(rod))

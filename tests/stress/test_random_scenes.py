@@ -123,4 +123,4 @@ class TestJudge:
                 pass
 
         monkeypatch.setattr("kop_exudyn.analysis.stress.trial.solve", hang)
-        assert run_case(solved[0], time_limit=0.05).verdict == "hang"
+        assert run_case(solved[0], seconds=0.05).verdict == "hang"

@@ -1,12 +1,8 @@
 """Tries a stress case and judges the outcome with nothing that the solver said about itself."""
 from __future__ import annotations
 
-import contextlib
-import signal
-import threading
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Iterator
 
 import numpy as np
 
@@ -16,17 +12,14 @@ from ...equilibrium.newton import Equilibrium, NewtonOptions, Start, refine, sol
 from ...equilibrium.stability import softest_mode
 from ...equilibrium.system import System
 from ...errors import SimulationFailure
+from .limits import TimeOut, time_limit
 from .random_scenes import StressCase
 
 # Residual force that is passed as good: a share of the largest internal force, and a multiple of its round-off.
 _RESIDUAL, _ROUND_OFF = 1e-8, 100.0
 
 STABLE, FAILED = "stable", "failed"
-FORBIDDEN = ("unconverged", "unstable", "not finite", "not confirmed", "exception", "hang")
-
-
-class _TimeOut(Exception):
-    """A case took longer than it may."""
+FORBIDDEN = ("unconverged", "unstable", "not finite", "exception", "hang")
 
 
 @dataclass(frozen=True)
@@ -53,22 +46,22 @@ class Outcome:
         return self.verdict in FORBIDDEN
 
 
-def run_case(case: StressCase, time_limit: float = 60.0, options: NewtonOptions = NewtonOptions(),
+def run_case(case: StressCase, seconds: float = 60.0, options: NewtonOptions = NewtonOptions(),
              start: Start | None = None) -> Outcome:
     """Solve a case and judge it.
 
-    time_limit : seconds after which the case counts as a hang (where the system has alarms)
+    seconds : time after which the case counts as a hang (where the system has alarms)
     start : instead of the case's own
     """
     begin = perf_counter()
     try:
-        with _limited(time_limit):
+        with time_limit(seconds):
             eq = solve(System(case.scene), case.q, start or case.start, case.opening, options)
             found = judge(case, eq)
     except SimulationFailure as failure:
         return Outcome(case.seed, FAILED, failure.reason, wall_s=perf_counter() - begin)
-    except _TimeOut:
-        return Outcome(case.seed, "hang", f"not done after {time_limit:g} s", wall_s=time_limit)
+    except TimeOut:
+        return Outcome(case.seed, "hang", f"not done after {seconds:g} s", wall_s=seconds)
     except Exception as error:  # whatever it is: no other exception may leave the solver
         return Outcome(case.seed, "exception", f"{type(error).__name__}: {error}", wall_s=perf_counter() - begin)
     return Outcome(case.seed, *found, eq.iterations, eq.escapes, perf_counter() - begin,
@@ -116,22 +109,3 @@ def _measures(case: StressCase, eq: Equilibrium, verdict: str) -> tuple[float, f
     unit = float(case.scene.stiffness[:, 4:].min()) / case.conditions.unit
     moved = np.abs(eq.state.positions - case.scene.initial.positions).max() / case.scene.size
     return softest_mode(system).eigenvalue / unit, float(moved)
-
-
-@contextlib.contextmanager
-def _limited(seconds: float) -> Iterator[None]:
-    """Interrupt what takes longer; without effect where there are no alarms, or outside of the main thread."""
-    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def give_up(signum, frame):
-        raise _TimeOut
-
-    before = signal.signal(signal.SIGALRM, give_up)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
