@@ -1,0 +1,213 @@
+"""The 3D page: its data in Python; and, where Chromium is installed, what a browser makes of it."""
+import base64
+import hashlib
+import json
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from kop_exudyn.analysis.kit_result import KitResult
+from kop_exudyn.optimize.job import JobSettings, run_job
+from kop_exudyn.optimize.stages import StageSettings
+from kop_exudyn.report.viewer import (
+    ViewerDesign, ViewerPart, ViewerRods, ViewerScene, ViewerState, save_viewer, scene_data, viewer_page)
+from kop_exudyn.report.viewer_scenes import design_scene, kit_scene, opening_path
+from kop_exudyn.structures.base import design_from_dict
+
+SECTION = np.array([[0.1, 0.1], [-0.1, 0.1], [-0.1, -0.1], [0.1, -0.1]])
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+
+def two_rods(stage="input", opening=None, final=True, utilisation=0.5):
+    """Two rods of two and three rings, one beside the other."""
+    x = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 1, 0], [1, 1, 0]], float)
+    return ViewerState(stage, "deployed", x, np.broadcast_to(np.eye(3), (5, 3, 3)), deviation=np.linspace(0, 1.9, 5),
+                       utilisation=np.full(5, utilisation), opening=opening, final=final)
+
+
+def rods():
+    return ViewerRods(np.array([2, 3]), np.array([0, 1]), [SECTION], np.array([0, 0]))
+
+
+def plain_scene(**changes):
+    parts = [ViewerPart("L1", "linear", (0.8, 0.2, 0.1), "l1 1", (1, 1)), ViewerPart("L2", "linear", (0.1, 0.3, 0.8))]
+    designs = [ViewerDesign(name, {"deployed": rods()}, [two_rods(), two_rods("assigned")],
+                            (np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]]), np.array([[0, 1, 2]])))
+               for name in ("one", "two </script><b>")]
+    return ViewerScene("A <test> page", designs, parts, **changes)
+
+
+def shell(name, bow):
+    along = [[[-1.2, y - bow], [0, y], [1.2, y - 0.1]] for y in (-0.5, 0.4)]
+    across = [[[x, -0.9], [x * 1.1 + bow / 5, 0], [x, 0.9]] for x in (-0.8, 0.05, 0.7)]
+    return design_from_dict({
+        "class": "c_shell", "name": name, "opening": {"angle": 0.3}, "crossings": "find", "free_ends": False,
+        "material": {"young": 2.1e9, "poisson": 0.35, "elastic_limit": 4e7},
+        "section": {"type": "rectangle", "width": 0.03, "height": 0.004},
+        "curves": [{"type": "spline", "points": points, "closed": False} for points in along + across]})
+
+
+@pytest.fixture(scope="module")
+def result():
+    designs = [shell("flat", 0.1), shell("bent", 0.16)]
+    stages = StageSettings(schedule=(1e4,), relaxed_steps=1, assigned_steps=1, path_steps=2, rescues=0)
+    outcome = run_job(designs, {"linear": 2, "angular": 2}, JobSettings(jobs=1, baselines=False, stages=stages))
+    return KitResult(designs, outcome.references, outcome.stages)
+
+
+@pytest.fixture(scope="module")
+def kit_page(result):
+    return kit_scene(result, frames=3)
+
+
+def decoded(packed):
+    (kind, text), = packed.items()
+    return np.frombuffer(base64.b64decode(text), {"f32": "<f4", "i32": "<i4"}[kind])
+
+
+def data_on(page):
+    return json.loads(re.search(r'<script type="application/json" id="scene">(.*?)</script>', page, re.S).group(1))
+
+
+def test_page_is_one_file_that_loads_nothing():
+    page = viewer_page(plain_scene())
+    assert not re.search(r"(src|href)\s*=|url\(|@import|https?://|import\s*\(|fetch\(|XMLHttpRequest", page)
+    script = re.search(r"<script>(.*?)</script>", page, re.S).group(1)
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'" in page
+    assert "<title>A &lt;test&gt; page</title>" in page
+
+
+def test_data_comes_through_whatever_names_are():
+    data = data_on(viewer_page(plain_scene()))
+    assert data == json.loads(json.dumps(scene_data(plain_scene())))
+    assert data["designs"][1]["name"] == "two </script><b>"
+    state = data["designs"][0]["states"][0]
+    np.testing.assert_array_equal(decoded(state["places"]).reshape(-1, 3), two_rods().positions)
+    np.testing.assert_array_equal(decoded(state["turns"]).reshape(-1, 4), [[0, 0, 0, 1]] * 5)
+    np.testing.assert_array_equal(decoded(data["designs"][0]["rods"]["deployed"]["rings"]), [2, 3])
+
+
+def test_scales_end_at_handy_numbers_of_the_last_stage():
+    scene = plain_scene()
+    assert scene_data(scene)["limits"] == {"deviation": 2.0, "utilisation": 0.6}
+    assert scene_data(plain_scene(utilisation_limit=1.0))["limits"]["utilisation"] == 1.0
+    bare = ViewerState("input", "deployed", np.zeros((5, 3)), np.broadcast_to(np.eye(3), (5, 3, 3)))
+    data = scene_data(ViewerScene("bare", [ViewerDesign("one", {"deployed": rods()}, [bare])]))
+    assert data["colourings"] == ["plain"] and data["designs"][0]["states"][0]["deviation"] is None
+
+
+def test_kit_scene_has_all_stages_and_parts(result, kit_page):
+    assert [p.label for p in kit_page.parts] == ["A1", "A2", "L1", "L2"]
+    assert sum(p.uses[0] for p in kit_page.parts) == result.designs[0].n_elements
+    for n, design in enumerate(kit_page.designs):
+        final = [s for s in design.states if s.final]
+        assert {(s.stage, s.role) for s in final} == {(stage, role) for stage in ("input", "direct", "relaxed", "assigned")
+                                                     for role in ("deployed", "rest")}
+        scene, rods = result.designs[n].scene("deployed"), design.rods["deployed"]
+        assert rods.rings.sum() == sum(len(chain.nodes) for chain in scene.chains)
+        counts = np.bincount(rods.corner_parts, minlength=4)[:2]
+        np.testing.assert_array_equal(counts, [p.uses[n] for p in kit_page.parts[:2]])
+        assigned = next(s for s in final if (s.stage, s.role) == ("assigned", "deployed"))
+        outcome = result.stages["assigned"].designs[n]
+        assert f"max {outcome.fit.max_percent:.2g} %" in assigned.note
+        wanted = outcome.fit.placement.apply(outcome.equilibria["deployed"].state.positions[result.designs[n].joints])
+        np.testing.assert_allclose(assigned.joints, wanted, atol=1e-6)
+
+
+def test_rods_are_shown_with_the_part_that_makes_their_length(result, kit_page):
+    """Every rod piece's rest length is one of its part's two lengths."""
+    lengths, q = result.kit["linear"], result.stages["assigned"].designs[0].q
+    scene, rods = result.designs[0].scene("deployed"), kit_page.designs[0].rods["deployed"]
+    rest = scene.rest_lengths(q)
+    for chain, part in zip(scene.chains, rods.parts):
+        assert np.isclose(rest[chain.elements].sum(), lengths[part - 2], rtol=1e-9).any()
+
+
+def test_opening_path_closes_step_by_step(result, kit_page):
+    design, outcome = result.designs[0], result.stages["assigned"].designs[0]
+    path = opening_path(design, outcome.equilibria["deployed"], "deployed", 3)
+    openings = [outcome.equilibria["deployed"].opening] + [eq.opening for eq in path]
+    closed = next(r.opening for r in design.roles if r.name == "rest")
+    assert len(path) >= 1 and (np.diff(np.abs(np.array(openings) - closed)) < 0).all()
+    energies = [eq.elastic_energy for eq in path]
+    assert (np.diff([outcome.equilibria["deployed"].elastic_energy, *energies]) < 0).all()
+    assert sum(not s.final for s in kit_page.designs[0].states) == len(path)
+
+
+def test_a_single_design_without_parts(result):
+    scene = design_scene(result.designs[0], result.references[0].equilibria)
+    data = scene_data(scene)
+    assert data["parts"] == [] and "part" not in data["colourings"] and "utilisation" in data["colourings"]
+    assert (decoded(data["designs"][0]["rods"]["deployed"]["part"]) == -1).all()
+
+
+# -- in a browser -----------------------------------------------------------------------------------------------------
+browser = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
+
+
+def run_chromium(page, tmp_path, *options):
+    return subprocess.run(
+        [CHROMIUM, "--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
+         "--enable-unsafe-swiftshader", "--disable-background-networking", "--window-size=900,600",
+         f"--user-data-dir={tmp_path / 'profile'}", "--virtual-time-budget=3000", *options, page],
+        capture_output=True, text=True, timeout=120)
+
+
+@browser
+def test_page_draws_in_chromium(kit_page, tmp_path):
+    path = save_viewer(tmp_path / "view.html", kit_page)
+    assert path.stat().st_size < 2e6
+    done = run_chromium(f"{path.as_uri()}#design=0&stage=assigned&role=deployed&colour=part&target=0", tmp_path,
+                        "--dump-dom")
+    assert 'data-ready="1"' in done.stdout and "data-failed" not in done.stdout
+    assert "Content Security Policy" not in done.stderr
+    for piece in ("<b>flat</b>", ">L2</button>", "angular parts"):
+        assert piece in done.stdout
+
+
+@browser
+def test_picture_has_the_parts_colours(kit_page, tmp_path):
+    """Rods of one part coloured, the others pale; all coloured by value in the scale's colours."""
+    from matplotlib.image import imread
+
+    path = save_viewer(tmp_path / "view.html", kit_page)
+    pictures = {}
+    for view in ("part=L1&colour=part", "colour=deviation"):
+        run_chromium(f"{path.as_uri()}#design=0&target=0&{view}", tmp_path, f"--screenshot={tmp_path / 'view.png'}")
+        pictures[view] = imread(tmp_path / "view.png")[60:, 300:, :3].reshape(-1, 3)
+    for view, pixels in pictures.items():
+        drawn = pixels[np.ptp(pixels, axis=1) > 0.25]
+        assert len(drawn) > 300, view
+    hue = pictures["part=L1&colour=part"]
+    hue = hue[np.ptp(hue, axis=1) > 0.25]
+    colour = np.array(next(p.colour for p in kit_page.parts if p.label == "L1"))
+    alike = (hue - hue.mean(axis=1, keepdims=True)) @ (colour - colour.mean())
+    assert (alike > 0).mean() > 0.95
+
+
+@browser
+def test_a_click_highlights_the_part(kit_page, tmp_path):
+    """Clicks all over the drawing until one meets a rod; the label of its part is pressed then."""
+    clicks = """<script>addEventListener("load", () => setTimeout(() => {
+      const canvas = document.getElementById("canvas"), box = canvas.getBoundingClientRect();
+      const found = new Set();
+      for (let y = 40; y < box.height && found.size < 4; y += 23) for (let x = 20; x < box.width; x += 31) {
+        for (const name of ["pointerdown", "pointerup"])
+          canvas.dispatchEvent(new PointerEvent(name, {pointerId: 1, button: 0, clientX: box.left + x, clientY: box.top + y}));
+        const part = new URLSearchParams(location.hash.slice(1)).get("part");
+        const pressed = document.querySelector("#legend button[aria-pressed=true]");
+        if (part) found.add(part + "/" + (pressed ? pressed.textContent : "none"));
+      }
+      document.body.dataset.found = [...found].sort().join(" ");
+    }, 300));</script>"""
+    page = re.sub(r"<meta http-equiv=.*?>", "", viewer_page(kit_page)).replace("</body>", clicks + "</body>")
+    page = page.replace("canvas.setPointerCapture(e.pointerId);", "")  # only real pointers can be captured
+    path = tmp_path / "clicked.html"
+    path.write_text(page, encoding="utf-8")
+    done = run_chromium(f"{path.as_uri()}#design=-1&role=rest", tmp_path, "--dump-dom")
+    found = re.search(r'data-found="([^"]*)"', done.stdout).group(1).split()
+    assert len(found) >= 3 and set(found) <= {f"{p.label}/{p.label}" for p in kit_page.parts}
