@@ -13,10 +13,12 @@ from .kit_drawings import drawn_designs, final_states, histories, part_spaces, r
 from .page import Page
 from .parameters import draw_parameters
 from .style import save_figure
+from .viewer import save_viewer
+from .viewer_scenes import kit_scene
 
 
 def write_kit_report(result: KitResult, folder: Path) -> Path:
-    """Write result.json, kit.json, states.npz, the figures and index.html; files of those names are replaced.
+    """Write result.json, kit.json, states.npz, figures, viewer.html and index.html; files of those names are replaced.
 
     Returns the page's path. Raises InputError when a file can't be written.
     """
@@ -27,6 +29,7 @@ def write_kit_report(result: KitResult, folder: Path) -> Path:
                "parameters": draw_parameters(part_spaces(result))}
     for name, figure in figures.items():
         save_figure(figure, folder / name, overwrite=True)
+    save_viewer(folder / "viewer.html", kit_scene(result), overwrite=True)
     return _page(result, figures).save(folder / "index.html", overwrite=True)
 
 

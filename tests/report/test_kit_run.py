@@ -89,7 +89,7 @@ def test_the_folder_holds_all_that_is_promised(finished):
     result, out = finished
     names = {path.name for path in out.iterdir()}
     figures = {f"{name}.{suffix}" for name in ("designs", "history", "parameters") for suffix in ("svg", "png")}
-    assert names == figures | {"result.json", "kit.json", "states.npz", "index.html", "checkpoints"}
+    assert names == figures | {"result.json", "kit.json", "states.npz", "viewer.html", "index.html", "checkpoints"}
     np.testing.assert_array_equal(load_kit(out / "kit.json").vector, result.kit.vector)
     state = load_states(out / "states.npz")["zigzag 1", "assigned", "deployed"]
     kept = result.stages["assigned"].designs[1].equilibria["deployed"].state

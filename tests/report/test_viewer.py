@@ -208,6 +208,10 @@ def test_a_click_highlights_the_part(kit_page, tmp_path):
     page = page.replace("canvas.setPointerCapture(e.pointerId);", "")  # only real pointers can be captured
     path = tmp_path / "clicked.html"
     path.write_text(page, encoding="utf-8")
-    done = run_chromium(f"{path.as_uri()}#design=-1&role=rest", tmp_path, "--dump-dom")
-    found = re.search(r'data-found="([^"]*)"', done.stdout).group(1).split()
+    for _ in range(3):  # on a busy machine the browser may be asked before its first frame is drawn
+        done = run_chromium(f"{path.as_uri()}#design=-1&role=rest", tmp_path, "--dump-dom")
+        match = re.search(r'data-found="([^"]*)"', done.stdout)
+        found = match.group(1).split() if match else []
+        if len(found) >= 3:
+            break
     assert len(found) >= 3 and set(found) <= {f"{p.label}/{p.label}" for p in kit_page.parts}
