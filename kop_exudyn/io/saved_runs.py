@@ -1,0 +1,79 @@
+"""Results of finished runs, read back from their folder: what `kop export` and `kop view` work on."""
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Mapping, Sequence
+
+import numpy as np
+
+from ..analysis.kit_result import STAGES, KitResult
+from ..equilibrium.newton import solve
+from ..errors import InputError, SimulationFailure
+from ..kit.parts import Assignment, Kit
+from ..optimize.objective import DesignObjective, Evaluation, Reference, reference_of
+from ..optimize.stages import StageResult
+from ..scene.state import State
+from ..structures.base import Design
+from .results import load_result, load_states
+
+_LAST = "assigned"
+_SAME_PLACE = 1e-6  # of the size: how near a saved state is to the equilibrium found from it
+
+
+def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
+    """A run's result, from result.json and states.npz in its folder and the designs that it was made for.
+
+    The input designs are simulated again; saved states are solved for once more, from where they are, and confirmed by
+    Exudyn. The assigned stage is always there; earlier ones are where states.npz has their parameters.
+
+    Raises InputError when the files are damaged or belong to other designs, SimulationFailure when an input design
+    can't be simulated.
+    """
+    folder = Path(folder)
+    path = folder / "result.json"
+    data, states = load_result(path), load_states(folder / "states.npz")
+    names = [design["name"] for design in data["designs"]]
+    if names != [design.name for design in designs]:
+        raise InputError(f"is of other designs: {', '.join(names)}", source=path, field="designs",
+                         value=[design.name for design in designs])
+    kit = Kit.from_dict(data["kit"], source=str(path))
+    offsets = np.cumsum([0, *(len(design.parameters) for design in designs)])
+    groups = [group.shifted(start) for design, start in zip(designs, offsets) for group in design.groups]
+    assignment = Assignment.from_dict(data["assignment"], groups, int(offsets[-1]), kit, source=str(path))
+    realised = np.split(assignment.matrix(kit) @ kit.vector, offsets[1:-1])
+    references = [reference_of(design) for design in designs]
+    result = KitResult(list(designs), references, {}, settings=data["settings"], equilibria=data["equilibria"],
+                       newton_iterations=data["newton_iterations"], wall_s=data["wall_s"],
+                       peak_memory_mb=data["peak_memory_mb"])
+    for stage in STAGES:
+        outcomes = [_outcome(design, reference, stage, states, entry, q if stage == _LAST else None)
+                    for design, reference, entry, q in zip(designs, references, data["designs"], realised)]
+        if None not in outcomes:
+            result.stages[stage] = StageResult(outcomes, kit, assignment, data["steps"].get(stage, 0),
+                                               data["objective"].get(stage), data["status"].get(stage, ""))
+    return result
+
+
+def _outcome(design: Design, reference: Reference, stage: str, states: Mapping[tuple[str, str, str], Any],
+             entry: Mapping[str, Any], q: np.ndarray | None) -> Evaluation | SimulationFailure | None:
+    """One design after a stage; None when the files don't say enough."""
+    if "failed" in entry.get(stage, {}):
+        return SimulationFailure(entry[stage]["failed"])
+    saved = {role.name: states.get((design.name, stage, role.name)) for role in design.roles}
+    if None in saved.values():
+        return None
+    q = next(iter(saved.values())).get("parameters", q)
+    if q is None:
+        return None
+    equilibria = {}
+    for role in design.roles:
+        state = State(*(saved[role.name][field] for field in ("positions", "rotations", "angles")))
+        scene = design.scene(role.name)
+        if (len(state.positions), len(state.angles)) != (scene.n_bodies, scene.n_hinges):
+            raise InputError("the saved states are of another version of this design", source=design.name, field=stage)
+        found = solve(design.systems[role.name], q, state, role.opening)
+        if np.abs(found.state.positions - state.positions).max() > _SAME_PLACE * scene.size:
+            raise InputError("the saved states are no equilibria of this design", source=design.name, field=stage)
+        equilibria[role.name] = found
+    objective = DesignObjective(design, reference=reference)
+    return objective.confirm(objective.judge(q, equilibria))
