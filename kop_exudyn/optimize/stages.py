@@ -8,7 +8,7 @@ from typing import Any, Callable, Mapping, Protocol, Sequence
 
 import numpy as np
 
-from ..errors import SimulationFailure
+from ..errors import InputError, SimulationFailure
 from ..kit.cluster import cluster
 from ..kit.kinds import Bounds
 from ..kit.parts import Assignment, Kit
@@ -226,14 +226,13 @@ class Stages:
         state, saved = None, self.store.load(name)
         terms: list[str] = []
         if saved is not None:
-            state = SQPState.from_arrays({k[4:]: v for k, v in saved.items() if k.startswith("sqp/")})
-            evaluations = evaluations_from_arrays(
-                problem.dataset, {k[7:]: v for k, v in saved.items() if k.startswith("states/")})
-            start = (problem.point(state.x, evaluations, problem.kit.with_vector(saved["kit"]))
-                     if isinstance(problem, RelaxedProblem) else problem.point(state.x, evaluations))
-            tally.equilibria += int(saved["tally"][0])
-            tally.newton_iterations += int(saved["tally"][1])
-            terms = [str(row) for row in saved["terms"]]
+            try:
+                state, start, terms = _restored(problem, saved)
+                equilibria, iterations = saved["tally"].astype(int).tolist()
+            except (IndexError, KeyError, TypeError, ValueError):  # some array is missing or of another shape
+                raise InputError(f"the checkpoint {name!r} is damaged: start anew instead of resuming") from None
+            tally.equilibria += equilibria
+            tally.newton_iterations += iterations
             for record, row in zip(state.history, terms):
                 self.observer(StageEvent(name, record, json.loads(row), weight))
 
@@ -280,6 +279,16 @@ class Stages:
         complete = all(isinstance(d, Evaluation) for d in designs)
         return StageResult(designs, kit, assignment, steps, self.dataset.value(designs) if complete else None, status,
                            list(jumps))
+
+
+def _restored(problem: Any, saved: Mapping[str, np.ndarray]) -> tuple[SQPState, Point, list[str]]:
+    """State, point and the steps' terms of a checkpoint."""
+    state = SQPState.from_arrays({k[4:]: v for k, v in saved.items() if k.startswith("sqp/")})
+    evaluations = evaluations_from_arrays(
+        problem.dataset, {k[7:]: v for k, v in saved.items() if k.startswith("states/")})
+    point = (problem.point(state.x, evaluations, problem.kit.with_vector(saved["kit"]))
+             if isinstance(problem, RelaxedProblem) else problem.point(state.x, evaluations))
+    return state, point, [str(row) for row in saved["terms"]]
 
 
 def find_jump(design: Any, start: Evaluation, path: Sequence[Evaluation], diagonal: float) -> Jump | None:
