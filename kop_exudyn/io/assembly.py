@@ -16,7 +16,7 @@ from .tables import write_csv
 def assembly_plan(parts: PartsList, name: str, unit: str) -> list[dict[str, Any]]:
     """One row an element of the design of that name, in the elements' order.
 
-    Of a beam: the joint that it carries, and for each of its sides the part's side used there, its length and the
+    Of a beam: the joint that it carries (of a cell: all that its bars end at), and for each of its sides the part's side used there, its length and the
     corner or free end that it leads to. Of a corner: its signed turn, and the elements before and after it; positive
     turns are counter-clockwise about the hinge axis when walking from "before" to "after".
 
@@ -38,7 +38,7 @@ def write_assembly_plan(path: str | Path, parts: PartsList, name: str, unit: str
 def _where(placed: PlacedPieces, parts: PartsList, piece: Piece, scale: float) -> dict[str, Any]:
     if part_kind(piece.kind).angular:
         return _corner(placed, piece)
-    row: dict[str, Any] = {"joint": placed.joint_of(piece)}
+    row: dict[str, Any] = {"joint": " ".join(map(str, placed.joints_of(piece)))}
     names = part_kind(piece.kind).parameter_names
     for side, (parameter, column, value) in enumerate(zip(piece.parameters, piece.columns, piece.values), 1):
         row |= {f"side_{side}": names[column], f"side_{side}_mm": round(value * scale, 4),
@@ -60,9 +60,9 @@ def _elements(placed: PlacedPieces, chains: tuple[int, ...]) -> str:
 
 
 def _leads_to(placed: PlacedPieces, parts: PartsList, parameter: int) -> str:
-    """What is at the outer end of the rod pieces that a parameter drives."""
-    ends = [placed.far_end(chain) for chain in placed.chains.get(parameter, [])]
-    return ", ".join(dict.fromkeys(_named(placed, parts, body) for body in ends))
+    """What is at the outer end of the rod piece that a parameter drives; of several, as in cells, nothing."""
+    chains = placed.chains.get(parameter, [])
+    return _named(placed, parts, placed.far_end(chains[0])) if len(chains) == 1 else ""
 
 
 def _named(placed: PlacedPieces, parts: PartsList, body: int) -> str:

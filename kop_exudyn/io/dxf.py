@@ -2,7 +2,9 @@
 from __future__ import annotations
 
 import io
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, Iterator
 
 from ..errors import InputError
 from .cutsheets import Sheet
@@ -15,7 +17,20 @@ _COLOURS = {CUT: 1, ENGRAVE: 5, NOTES: 8}  # AutoCAD's colour numbers: red, blue
 def dxf_text(sheet: Sheet) -> str:
     """The sheet as DXF. Raises InputError without ezdxf."""
     ezdxf = _ezdxf()
-    document = ezdxf.new("R2010", units=ezdxf.units.MM)
+    with _without_dates(ezdxf.options):
+        document = ezdxf.new("R2010", units=ezdxf.units.MM)
+        _fill(ezdxf, document, sheet)
+        buffer = io.StringIO()
+        document.write(buffer)
+    return buffer.getvalue()
+
+
+def write_dxf(path: str | Path, sheet: Sheet, *, overwrite: bool = False) -> Path:
+    """Write a sheet. Raises InputError when the file exists or can't be written, and without ezdxf."""
+    return write_text(path, dxf_text(sheet), overwrite=overwrite)
+
+
+def _fill(ezdxf: Any, document: Any, sheet: Sheet) -> None:
     for layer, colour in _COLOURS.items():
         document.layers.add(layer, color=colour)
     space = document.modelspace()
@@ -29,23 +44,24 @@ def dxf_text(sheet: Sheet) -> str:
             align = "MIDDLE_CENTER" if shape.align == "middle" else "MIDDLE_LEFT"
             text = space.add_text(shape.text, height=shape.height, dxfattribs=attributes)
             text.set_placement(shape.at.tolist(), align=ezdxf.enums.TextEntityAlignment[align])
-    buffer = io.StringIO()
-    document.write(buffer)
-    return buffer.getvalue()
 
 
-def write_dxf(path: str | Path, sheet: Sheet, *, overwrite: bool = False) -> Path:
-    """Write a sheet. Raises InputError when the file exists or can't be written, and without ezdxf."""
-    return write_text(path, dxf_text(sheet), overwrite=overwrite)
+@contextmanager
+def _without_dates(options: Any) -> Iterator[None]:
+    """The same sheet gives the same bytes: no dates, no random ids. The user's own setting comes back."""
+    before = options.write_fixed_meta_data_for_testing
+    options.write_fixed_meta_data_for_testing = True
+    try:
+        yield
+    finally:
+        options.write_fixed_meta_data_for_testing = before
 
 
-def _ezdxf():
+def _ezdxf() -> Any:
     try:
         import ezdxf
         import ezdxf.enums
         import ezdxf.units
     except ImportError:
         raise InputError("DXF files need ezdxf: pip install 'kop_exudyn[fab]'", field="format", value="dxf") from None
-    # the same sheet gives the same bytes: no dates, no random ids
-    ezdxf.options.write_fixed_meta_data_for_testing = True
     return ezdxf

@@ -103,11 +103,16 @@ class PlacedPieces:
         parameters = [int(self.scene.length_parameter[chain.elements[0]]) for chain in self.scene.chains]
         return [self.pieces.by_parameter.get(parameter) for parameter in parameters]
 
+    def joints_of(self, piece: Piece) -> list[int]:
+        """Numbers of the joints that a piece's rods end at."""
+        bodies = {int(body) for parameter in piece.parameters for chain in self.chains.get(parameter, [])
+                  for body in self.ends[chain]}
+        return sorted(self.joint_numbers[body] for body in bodies if body in self.joint_numbers)
+
     def joint_of(self, piece: Piece) -> int | None:
         """Number of the joint that a piece carries; None where it has none, or several."""
-        bodies = {int(body) for parameter in piece.parameters for chain in self.chains.get(parameter, [])
-                  for body in self.ends[chain] if int(body) in self.joint_numbers}
-        return self.joint_numbers[bodies.pop()] if len(bodies) == 1 else None
+        joints = self.joints_of(piece)
+        return joints[0] if len(joints) == 1 else None
 
     def far_end(self, chain: int) -> int:
         """The body at that end of a rod piece which is not a joint of the design (the last one where none is)."""

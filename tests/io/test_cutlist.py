@@ -98,7 +98,7 @@ def test_every_corner_is_met_from_two_sides(parts):
 
 def test_every_joint_carries_two_beams(parts):
     joints = Counter(row["joint"] for row in assembly_plan(parts, "first", "m") if row["kind"] == "linear")
-    assert joints == {number: 2 for number in range(1, 7)}
+    assert joints == {str(number): 2 for number in range(1, 7)}
 
 
 def test_an_assignment_of_other_designs_is_refused(parts, clustering, shells):
@@ -114,8 +114,11 @@ def test_umbrella_cells_are_sets_of_bars():
         "base": {"vertices": [[40 * x, 40 * y] for x, y in ((0, 0), (1, 0), (0.5, s), (0.5, -s), (1.5, s), (-0.5, s))],
                  "faces": [[0, 1, 2], [0, 3, 1], [1, 4, 2], [2, 5, 0]]}})
     found = cluster(design.groups, design.parameters, {"cell": 2})
-    rows = cut_list(parts_list(found.kit, found.assignment, [design]), "mm")
+    parts = parts_list(found.kit, found.assignment, [design])
+    rows = cut_list(parts, "mm")
     assert [row["part"] for row in rows] == ["C1", "C2"]
     by_length = {row["top_mm"]: row for row in rows}
     assert (by_length[32.0]["pieces"], by_length[32.0]["bars_top"], by_length[32.0]["bars_bottom"]) == (1, 3, 3)
     assert (by_length[34.0]["pieces"], by_length[34.0]["bars_top"]) == (3, 3)
+    plan = assembly_plan(parts, "small", "mm")
+    assert plan[0]["joint"] == "1 2 3" and sorted(row["joint"] for row in plan[1:]) == ["1", "2", "3"]
