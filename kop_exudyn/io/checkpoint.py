@@ -13,7 +13,7 @@ from .. import __version__
 from ..errors import InputError
 from .arrays import load_arrays, save_arrays
 from .documents import check_envelope
-from .files import make_folder, read_bytes
+from .files import is_temporary, make_folder, read_bytes
 from .json_files import plain, read_json, write_json
 
 CHECKPOINT_VERSION = 1
@@ -82,6 +82,8 @@ class CheckpointStore:
         Raises InputError when the folder can't be written, or when it is to be resumed but belongs to another job.
         """
         folder = make_folder(folder)
+        for left in filter(is_temporary, list(folder.iterdir())):
+            left.unlink(missing_ok=True)
         record = folder / _JOB_FILE
         if resume and record.exists():
             difference = Job.load(record).difference(job)

@@ -13,6 +13,7 @@ from ..errors import InputError
 SIZE_LIMIT = 512 * 2**20
 
 _GZIP_MAGIC = b"\x1f\x8b"
+_TEMPORARY = ".part"
 
 
 def read_bytes(path: str | Path, limit: int = SIZE_LIMIT) -> bytes:
@@ -50,7 +51,8 @@ def write_bytes(path: str | Path, content: bytes, *, overwrite: bool = False) ->
     temporary = None
     try:
         # in the same folder, so that os.replace stays within one file system and is atomic
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.", suffix=_TEMPORARY,
+                                         delete=False) as file:
             temporary = file.name
             file.write(content)
             file.flush()
@@ -63,6 +65,11 @@ def write_bytes(path: str | Path, content: bytes, *, overwrite: bool = False) ->
         if temporary is not None and os.path.exists(temporary):
             os.unlink(temporary)
     return path
+
+
+def is_temporary(path: Path) -> bool:
+    """Whether this is what `write_bytes` leaves when the process is killed while it writes."""
+    return path.name.startswith(".") and path.name.endswith(_TEMPORARY)
 
 
 def write_text(path: str | Path, text: str, *, overwrite: bool = False) -> Path:

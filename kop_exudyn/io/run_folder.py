@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from .checkpoint import CheckpointStore, Job
-from .files import make_folder
+from .files import is_temporary, make_folder
 
 log = logging.getLogger(__name__)
 
@@ -44,8 +44,14 @@ class RunFolder:
 
 
 def _check_free(path: Path, record: Path, job: Job) -> None:
-    """Raise InputError unless the folder is empty or an earlier run of the same job wrote it."""
-    if not any(path.iterdir()):
+    """Raise InputError unless the folder is empty or an earlier run of the same job wrote it.
+
+    A run that ended before its job was recorded leaves nothing but an empty folder for checkpoints.
+    """
+    content = list(path.iterdir())
+    if content == [record.parent]:
+        content = [entry for entry in record.parent.iterdir() if not is_temporary(entry)]
+    if not content:
         return
     if not record.exists():
         raise InputError("the folder isn't empty and wasn't written by an earlier run: choose another or allow "

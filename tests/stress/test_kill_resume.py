@@ -1,0 +1,154 @@
+"""Interrupted at any moment and resumed, a job gives what it would have given undisturbed, bit for bit."""
+from __future__ import annotations
+
+import errno
+import os
+
+import numpy as np
+import pytest
+
+from kop_exudyn.analysis.stress import kills
+from kop_exudyn.analysis.stress.arch import arches
+from kop_exudyn.analysis.stress.interruption import FailingStore, MemoryStore, fingerprint, resumed_at
+from kop_exudyn.errors import InputError
+from kop_exudyn.io import files
+from kop_exudyn.io.arrays import load_arrays
+from kop_exudyn.optimize import pool
+from kop_exudyn.optimize.job import JobSettings, run_job
+from kop_exudyn.optimize.stages import StageSettings
+from kop_exudyn.report.kit_run import optimize_kit
+
+PARTS = {"linear": 2}
+SETTINGS = JobSettings(jobs=1, stages=StageSettings(schedule=(1e3, 1e5)))
+
+
+@pytest.fixture(scope="module")
+def undisturbed():
+    """The outcome, the events and the number of checkpoints of a job that nobody disturbs."""
+    store, events = MemoryStore(), []
+    outcome = run_job(arches(), PARTS, SETTINGS, store, events.append)
+    assert store.saves >= 8
+    return fingerprint(outcome, events), (outcome.equilibria, outcome.newton_iterations), store.saves
+
+
+@pytest.mark.parametrize("after", [False, True])
+@pytest.mark.parametrize("at", [1, 2, 4, 7, -1])
+def test_interrupted_at_a_checkpoint(undisturbed, at, after):
+    """Before it is kept, or right after."""
+    expected, cost, saves = undisturbed
+    outcome, events = resumed_at(at if at > 0 else saves, arches(), PARTS, SETTINGS, after)
+    assert fingerprint(outcome, events) == expected
+    if after:  # nothing had to be done again
+        assert (outcome.equilibria, outcome.newton_iterations) == cost
+
+
+@pytest.mark.parametrize("batch", [1, 2, 3, 5, 8, 13, 21])
+def test_interrupted_between_checkpoints(undisturbed, monkeypatch, batch):
+    """In the middle of a step: while the batch-th lot of simulations is running."""
+    store, events, batches = MemoryStore(), [], []
+    original = pool.DesignPool._run
+
+    def interrupted(self, tasks):
+        batches.append(len(tasks))
+        if len(batches) == batch:
+            original(self, tasks[:1])
+            raise KeyboardInterrupt
+        return original(self, tasks)
+
+    monkeypatch.setattr(pool.DesignPool, "_run", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run_job(arches(), PARTS, SETTINGS, store)
+    outcome = run_job(arches(), PARTS, SETTINGS, store, events.append)
+    assert fingerprint(outcome, events) == undisturbed[0]
+
+
+def test_interrupted_again_and_again(undisturbed):
+    """At every checkpoint, each run getting just one further."""
+    store, events, runs = MemoryStore(), [], 0
+    while True:
+        failing = FailingStore(1, KeyboardInterrupt(), after=True)
+        failing.kept, events, runs = store.kept, [], runs + 1
+        try:
+            outcome = run_job(arches(), PARTS, SETTINGS, failing, events.append)
+            break
+        except KeyboardInterrupt:
+            continue
+    assert runs == undisturbed[2] + 1
+    assert fingerprint(outcome, events) == undisturbed[0]
+
+
+@pytest.mark.parametrize("damage", [
+    lambda arrays: arrays.pop("tally"), lambda arrays: arrays.pop("sqp/numbers"), lambda arrays: arrays.pop("kit"),
+    lambda arrays: arrays.update({"sqp/x": np.zeros(3)}), lambda arrays: arrays.update({"0/deployed/numbers": np.zeros(2)}),
+    lambda arrays: arrays.update({"states/0/deployed/numbers": np.zeros(2)}),
+])
+def test_a_checkpoint_of_something_else(damage):
+    store = MemoryStore()
+    run_job(arches(), PARTS, SETTINGS, store)
+    before = {name: dict(arrays) for name, arrays in store.kept.items()}
+    damage(store.kept["relaxed-1000"])
+    if "0/deployed/numbers" in store.kept["relaxed-1000"]:  # an array too many harms nobody
+        run_job(arches(), PARTS, SETTINGS, store)
+        return
+    with pytest.raises(InputError, match="checkpoint 'relaxed-1000' is damaged: start anew"):
+        run_job(arches(), PARTS, SETTINGS, store)
+    assert store.kept.keys() == before.keys()
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory):
+    """What an undisturbed run leaves."""
+    out = tmp_path_factory.mktemp("good") / "out"
+    optimize_kit(arches(), PARTS, out=out, settings=SETTINGS)
+    return kills.outcome(out)
+
+
+class TestFullDisk:
+    @pytest.mark.parametrize("write", [1, 3, 6, 11])
+    def test_the_run_ends_cleanly_and_goes_on_later(self, tmp_path, monkeypatch, good, write):
+        """No space left at the write-th file: one line, the files before it whole, none half written, then resumed."""
+        original, writes = os.fsync, []
+
+        def fsync(descriptor):
+            writes.append(descriptor)
+            if len(writes) >= write:
+                raise OSError(errno.ENOSPC, "No space left on device")
+            original(descriptor)
+
+        monkeypatch.setattr(files.os, "fsync", fsync)
+        with pytest.raises(InputError, match="can't be written: no space left on device"):
+            optimize_kit(arches(), PARTS, out=tmp_path / "full", settings=SETTINGS)
+        left = [path for path in (tmp_path / "full").rglob("*") if path.is_file()]
+        assert not [path for path in left if path.name.startswith(".")]
+        for path in left:
+            if path.suffix == ".npz":
+                load_arrays(path)
+        monkeypatch.setattr(files.os, "fsync", original)
+        optimize_kit(arches(), PARTS, out=tmp_path / "full", settings=SETTINGS, resume=True)
+        assert kills.outcome(tmp_path / "full") == good
+
+    def test_a_store_that_raises_leaves_what_it_kept(self):
+        store = FailingStore(4, OSError(errno.ENOSPC, "No space left on device"))
+        with pytest.raises(OSError, match="No space left"):
+            run_job(arches(), PARTS, SETTINGS, store)
+        assert store.saves == 3 and store.kept
+
+
+def test_what_a_kill_while_writing_leaves_is_cleaned_up(tmp_path, good):
+    """Killed before the job was recorded: an empty folder and a piece of a file are no obstacle."""
+    checkpoints = tmp_path / "out" / "checkpoints"
+    checkpoints.mkdir(parents=True)
+    piece = checkpoints / ".job.json.x3f.part"
+    piece.write_bytes(b"{")
+    optimize_kit(arches(), PARTS, out=tmp_path / "out", settings=SETTINGS, resume=True)
+    assert not piece.exists()
+    assert kills.outcome(tmp_path / "out") == good
+
+
+def test_killed_processes(tmp_path):
+    """SIGKILL to the command line, wherever it is; no step that a checkpoint held is ever lost."""
+    designs = kills.write_designs(tmp_path / "designs")
+    kills.finish(kills.start(designs, tmp_path / "good"))
+    hits, kept = kills.killed_and_resumed(designs, tmp_path / "killed", (0.0, 0.3, 0.7))
+    assert hits >= 2 and kept == sorted(kept)
+    assert kills.outcome(tmp_path / "killed") == kills.outcome(tmp_path / "good")

@@ -1,0 +1,179 @@
+"""Optimisation jobs that no user would ask for: they end in a kit or in a clean refusal, and never worse than they began."""
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from kop_exudyn.analysis.stress.arch import Arch, arches
+from kop_exudyn.analysis.stress.interruption import MemoryStore, fingerprint
+from kop_exudyn.errors import InputError, SimulationFailure
+from kop_exudyn.kit.parts import Kit
+from kop_exudyn.optimize import pool
+from kop_exudyn.optimize.job import JobSettings, run_job
+from kop_exudyn.optimize.stages import StageSettings
+
+SCHEDULE = (1e3, 1e5)
+
+
+def run(designs, parts, kit=None, **stages):
+    settings = JobSettings(jobs=1, stages=StageSettings(**({"schedule": SCHEDULE} | stages)))
+    return run_job(designs, {"linear": parts}, settings, MemoryStore(), kit=kit)
+
+
+def check(outcome, designs, given=False):
+    """What holds of every job that ended: finite values, stable states, every element exactly its part.
+
+    Only the parts of a given kit may be beyond the designs' own bounds.
+    """
+    for stage in outcome.stages.values():
+        for evaluation in stage.designs:
+            assert isinstance(evaluation, SimulationFailure) or np.isfinite(evaluation.value)
+    assigned = outcome.stages["assigned"]
+    if assigned.value is None:
+        return
+    assert all(eq.stable for e in assigned.designs for eq in e.equilibria.values())
+    realised = assigned.assignment.matrix(assigned.kit) @ assigned.kit.vector
+    np.testing.assert_array_equal(np.concatenate([e.q for e in assigned.designs]), realised)
+    if given:
+        return
+    lower, upper = (np.concatenate([getattr(d, name) for d in designs]) for name in ("lower", "upper"))
+    assert (realised >= lower - 1e-12).all() and (realised <= upper + 1e-12).all()
+
+
+EVEN = np.full((5, 2), 0.12)
+
+
+@pytest.mark.parametrize("designs, parts", [
+    ([Arch("even", EVEN, 0.96)], 1),
+    ([Arch("even", EVEN, 0.96)], 2),  # fewer different elements than parts
+    ([Arch("even", EVEN, 0.96), Arch("twin", EVEN, 0.96)], 5),
+    ([Arch("mirrored", [[0.1, 0.12], [0.12, 0.1], [0.1, 0.12], [0.1, 0.12], [0.12, 0.1]], 0.9)], 3),
+    (arches(), 10),  # every element its own part
+])
+def test_elements_that_repeat_and_parts_to_spare(designs, parts):
+    """Nothing has to change: the objective stays that of the inputs, 0.02 a design, and can only fall by a trifle."""
+    outcome = run(designs, parts)
+    check(outcome, designs)
+    assert outcome.stages["assigned"].value == pytest.approx(0.02 * len(designs), rel=1e-3)
+
+
+def test_one_part_for_all():
+    designs = arches()
+    outcome = run(designs, 1)
+    check(outcome, designs)
+    assert len(outcome.stages["assigned"].kit["linear"]) == 1
+    assert outcome.stages["assigned"].value < outcome.stages["direct"].value
+
+
+@pytest.mark.parametrize("bounds", [(0.12, 0.12), (0.05, 0.09), (0.15, 0.2), (0.11, 0.13)])
+def test_bounds_that_bind(bounds):
+    designs = arches()
+    outcome = run(designs, 2, bounds={"linear": bounds})
+    check(outcome, designs)
+    for stage in outcome.stages.values():
+        assert (stage.kit["linear"] >= bounds[0] - 1e-12).all() and (stage.kit["linear"] <= bounds[1] + 1e-12).all()
+
+
+def test_designs_whose_own_bounds_leave_no_room():
+    designs = [Arch("fixed", EVEN, 0.96, bounds=(0.12, 0.12))]
+    outcome = run(designs, 1)
+    check(outcome, designs)
+    np.testing.assert_array_equal(outcome.stages["assigned"].designs[0].q, EVEN.ravel())
+
+
+def test_bounds_without_room_for_any_part_are_refused():
+    with pytest.raises(InputError, match="bounds"):
+        run(arches(), 2, bounds={"linear": (0.2, 0.1)})
+
+
+@pytest.mark.parametrize("schedule", [(1e-6,), (1e9,), (1e-6, 1e9), (1e9, 1e-6), (1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9)])
+def test_weights_of_the_clusters_over_fifteen_decades(schedule):
+    designs = arches()
+    outcome = run(designs, 2, schedule=schedule)
+    check(outcome, designs)
+    stages = outcome.stages
+    assert stages["assigned"].value <= stages["unrelaxed"].value * (1 + 1e-9) < stages["direct"].value
+
+
+def test_the_other_hessian():
+    designs = arches()
+    outcome = run(designs, 2, hessian="bfgs")
+    check(outcome, designs)
+    assert outcome.stages["assigned"].value < outcome.stages["direct"].value
+
+
+@pytest.mark.parametrize("part, built", [(1e-3, True), (5.0, True), (1e6, False), (0.0, False)])
+def test_kits_that_the_designs_are_not_made_for(part, built, caplog):
+    """Stretched a hundredfold, wound up, or impossible: each design has a state or says why not."""
+    designs = arches()
+    outcome = run(designs, 1, kit=Kit({"linear": [[part, part]]}))
+    check(outcome, designs, given=True)
+    for evaluation in outcome.stages["assigned"].designs:
+        if built:
+            assert evaluation.confirmations["deployed"].moved < 1e-6
+        else:
+            assert isinstance(evaluation, SimulationFailure) and "to the parts" in str(evaluation)
+
+
+@pytest.mark.parametrize("pieces, message", [
+    (np.full((5, 2), np.nan), "rest length of element 0 is nan"), (np.full((5, 2), -0.1), "not positive")])
+def test_inputs_that_can_not_be_simulated(pieces, message):
+    with pytest.raises(SimulationFailure, match=f"bad: input design: .*{message}"):
+        run([*arches(1), Arch("bad", pieces, 0.5)], 2)
+
+
+class TestWorkers:
+    def test_killing_workers_changes_nothing(self, monkeypatch, caplog):
+        """SIGKILL to a worker while it works, twice: the batch is run again by new workers."""
+        designs = arches(3)
+        settings = JobSettings(jobs=2, stages=StageSettings(schedule=(1e3,), relaxed_steps=2, assigned_steps=2, path_steps=3))
+        undisturbed = fingerprint(run_job(designs, {"linear": 2}, settings))
+        monkeypatch.setattr(pool, "_call", _slow_call)
+        batches, kills = [], []
+        original = pool.DesignPool._run
+
+        def run_and_kill(self, tasks):
+            batches.append(len(tasks))
+            if len(batches) in (3, 6) and self._parallel is not None:
+                killer = threading.Timer(0.1, _kill_a_worker, [kills])
+                killer.start()
+                try:
+                    return original(self, tasks)
+                finally:
+                    killer.join()
+            return original(self, tasks)
+
+        monkeypatch.setattr(pool.DesignPool, "_run", run_and_kill)
+        assert fingerprint(run_job(designs, {"linear": 2}, settings)) == undisturbed
+        assert len(kills) == 2
+        assert caplog.text.count("a worker process ended unexpectedly") == 2
+
+    def test_workers_that_always_die_end_the_job(self, monkeypatch, caplog):
+        monkeypatch.setattr(pool, "_call", _die)
+        with pytest.raises(SimulationFailure, match="worker processes keep ending unexpectedly"):
+            run_job(arches(2), {"linear": 2}, JobSettings(jobs=2))
+
+
+_CALL = pool._call
+
+
+def _slow_call(*task):
+    time.sleep(0.15)
+    return _CALL(*task)
+
+
+def _die(*task):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def _kill_a_worker(kills: list[int]) -> None:
+    from joblib.externals.loky import reusable_executor
+
+    worker = next(iter(reusable_executor._executor._processes))
+    os.kill(worker, signal.SIGKILL)
+    kills.append(worker)
