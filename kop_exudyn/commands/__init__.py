@@ -4,4 +4,4 @@ A command is added by adding its module to NAMES; a module whose name would be a
 ``kop --help`` stays quick.
 """
 
-NAMES = ("simulate", "optimize", "import", "view")
+NAMES = ("simulate", "optimize", "import", "view", "export")
