@@ -7,9 +7,9 @@ Normal stress at a section's corner (y, z), with N, M_y, M_z in the rod's local 
 The element's generalised stresses are those of its middle; statics carry its moments to its ends, which are where they
 are largest: M_y +- Q_z L / 2 and M_z -+ Q_y L / 2 (exact for straight elements without loads in between). Torsion gives
 the shear stress |M_t| W / J with W the section's `torsion_modulus`, transverse forces 3/2 |Q| / A (Timoshenko and
-Goodier, Theory of Elasticity, for rectangles; 4/3 would do for circles). Equivalent stress after von Mises, sqrt(sigma^2
-+ 3 tau^2), of the worse of two points: a corner with torsion's largest shear, or the section's middle with that and the
-transverse shear. Torsion is largest at the middle of a side, so the sum is on the safe side.
+Goodier, Theory of Elasticity, for rectangles; 4/3 would do for circles). Equivalent stress after von Mises,
+sqrt(sigma^2 + 3 tau^2), of the worse of two points: a corner with torsion's largest shear, or the section's middle with
+that and the transverse shear. Torsion is largest at the middle of a side, so the sum is on the safe side.
 """
 from __future__ import annotations
 

@@ -16,9 +16,10 @@ from .tables import write_csv
 def assembly_plan(parts: PartsList, name: str, unit: str) -> list[dict[str, Any]]:
     """One row an element of the design of that name, in the elements' order.
 
-    Of a beam: the joint that it carries (of a cell: all that its bars end at), and for each of its sides the part's side used there, its length and the
-    corner or free end that it leads to. Of a corner: its signed turn, and the elements before and after it; positive
-    turns are counter-clockwise about the hinge axis when walking from "before" to "after".
+    Of a beam: the joint that it carries (of a cell: all that its bars end at), and for each of its sides the part's
+    side used there, its length and the corner or free end that it leads to. Of a corner: its signed turn, and the
+    elements before and after it; positive turns are counter-clockwise about the hinge axis when walking from "before"
+    to "after".
 
     unit : the designs' unit of length
     Raises InputError for a design that isn't there.

@@ -8,7 +8,7 @@ from typing import Iterable
 import numpy as np
 
 from ..analysis.kit_result import KitResult
-from ..analysis.strength import rod_strength, materials_of
+from ..analysis.strength import materials_of, rod_strength
 from ..errors import InputError
 from ..optimize.objective import Evaluation
 from .assembly import write_assembly_plan

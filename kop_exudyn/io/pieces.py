@@ -1,7 +1,7 @@
 """Which piece of which part sits where: what cut lists, assembly plans and coloured drawings are made from.
 
-Parts are numbered from 1 within their kind and labelled by the kind's initial: L1, L2, ..., A1, ... Elements are numbered
-from 1 within their design, in the order of its groups; joints in the order of the design's joints.
+Parts are numbered from 1 within their kind and labelled by the kind's initial: L1, L2, ..., A1, ... Elements are
+numbered from 1 within their design, in the order of its groups; joints in the order of the design's joints.
 """
 from __future__ import annotations
 

@@ -32,8 +32,9 @@ def ply_bytes(mesh: RodMesh, colours: np.ndarray) -> bytes:
     """Rod solids as binary PLY: colours (V, 3) in [0, 1] by vertex, and the rod piece that each vertex belongs to."""
     head = "\n".join([
         "ply", "format binary_little_endian 1.0", f"element vertex {len(mesh.vertices)}",
-        *(f"property double {axis}" for axis in "xyz"), *(f"property uchar {name}" for name in ("red", "green", "blue")),
-        "property int rod", f"element face {len(mesh.faces)}", "property list uchar int vertex_indices", "end_header", ""])
+        *(f"property double {axis}" for axis in "xyz"),
+        *(f"property uchar {name}" for name in ("red", "green", "blue")), "property int rod",
+        f"element face {len(mesh.faces)}", "property list uchar int vertex_indices", "end_header", ""])
     vertices = np.empty(len(mesh.vertices), [("x", "<f8", 3), ("colour", "u1", 3), ("rod", "<i4")])
     vertices["x"], vertices["rod"] = mesh.vertices, mesh.chains
     vertices["colour"] = np.round(255 * np.clip(np.broadcast_to(colours, mesh.vertices.shape), 0, 1))

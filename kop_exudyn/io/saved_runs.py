@@ -23,6 +23,7 @@ _SAME_PLACE = 1e-6  # of the size: how near a saved state is to the equilibrium 
 def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
     """A run's result, from result.json and states.npz in its folder and the designs that it was made for.
 
+    designs : those of the run, in any order; there may be others among them
     The input designs are simulated again; saved states are solved for once more, from where they are, and confirmed by
     Exudyn. The assigned stage is always there; earlier ones are where states.npz has their parameters.
 
@@ -32,10 +33,7 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
     folder = Path(folder)
     path = folder / "result.json"
     data, states = load_result(path), load_states(folder / "states.npz")
-    names = [design["name"] for design in data["designs"]]
-    if names != [design.name for design in designs]:
-        raise InputError(f"is of other designs: {', '.join(names)}", source=path, field="designs",
-                         value=[design.name for design in designs])
+    designs = _named(designs, [design["name"] for design in data["designs"]], path)
     kit = Kit.from_dict(data["kit"], source=str(path))
     offsets = np.cumsum([0, *(len(design.parameters) for design in designs)])
     groups = [group.shifted(start) for design, start in zip(designs, offsets) for group in design.groups]
@@ -52,6 +50,16 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
             result.stages[stage] = StageResult(outcomes, kit, assignment, data["steps"].get(stage, 0),
                                                data["objective"].get(stage), data["status"].get(stage, ""))
     return result
+
+
+def _named(designs: Sequence[Design], names: Sequence[str], path: Path) -> list[Design]:
+    """The designs of these names, each found once."""
+    found = [[design for design in designs if design.name == name] for name in names]
+    missing = [name for name, same in zip(names, found) if len(same) != 1]
+    if missing:
+        raise InputError(f"is of designs that aren't there, or not only once: {', '.join(missing)}", source=path,
+                         field="designs", value=[design.name for design in designs])
+    return [same[0] for same in found]
 
 
 def _outcome(design: Design, reference: Reference, stage: str, states: Mapping[tuple[str, str, str], Any],

@@ -1,9 +1,9 @@
 """Shapes of parts: strips with their joint, corner plates that hold two strips at an angle, plain bars.
 
-A strip is cut from a board as thick as the rods' thin side. Where the joint's axis passes through the board the joint is
-a hole; where it lies in the board (lamellas on edge) it is a slot to the middle, into which the crossing lamella's slot
-fits. Strips end at corners: they are set back there by as much as the sharpest corner of the kit needs, so that any
-two strips fit at any corner, and a plate on their sides joins them, bolted twice to each.
+A strip is cut from a board as thick as the rods' thin side. Where the joint's axis passes through the board the joint
+is a hole; where it lies in the board (lamellas on edge) it is a slot to the middle, into which the crossing lamella's
+slot fits. Strips end at corners: they are set back there by as much as the sharpest corner of the kit needs, so that
+any two strips fit at any corner, and a plate on their sides joins them, bolted twice to each.
 """
 from __future__ import annotations
 

@@ -61,6 +61,6 @@ def _array(name: str, values: np.ndarray, kind: str | None = None) -> str:
     values = np.asarray(values)
     integer = values.dtype.kind in "iu"
     components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
-    numbers = " ".join(map(str, values.ravel().tolist()) if integer else map(repr, values.astype(float).ravel().tolist()))
+    numbers = " ".join(map(repr, values.ravel().tolist() if integer else values.astype(float).ravel().tolist()))
     return (f'<DataArray type="{kind or ("Int64" if integer else "Float64")}" Name={quoteattr(name)}{components} '
             f'format="ascii">{numbers}</DataArray>')

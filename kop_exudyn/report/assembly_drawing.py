@@ -46,15 +46,16 @@ def draw_assembly(parts: PartsList, name: str, state: State, role: str) -> Figur
     size = _paper(sheet)
     with style():
         figure = Figure(figsize=size)
-        ax = figure.add_axes((_MARGIN / size[0], _MARGIN / size[1], 1 - 2 * _MARGIN / size[0], 1 - 2 * _MARGIN / size[1]))
+        left, bottom = _MARGIN / size[0], _MARGIN / size[1]
+        ax = figure.add_axes((left, bottom, 1 - 2 * left, 1 - 2 * bottom))
         ax.set_axis_off()
         ax.set_aspect("equal")
         _draw_rods(ax, parts, placed, sheet)
         for piece in placed.pieces.pieces:
             _label(ax, parts, placed, sheet, piece)
         _draw_joints(ax, sheet)
-        figure.text(_MARGIN / size[0], 1 - 0.35 / size[1], name, size=11, weight="bold", va="center")
-        figure.text(_MARGIN / size[0], 0.3 / size[1], _explanation(placed), size=7.5, color=QUIET, va="center")
+        figure.text(left, 1 - 0.35 / size[1], name, size=11, weight="bold", va="center")
+        figure.text(left, 0.3 / size[1], _explanation(placed), size=7.5, color=QUIET, va="center")
     return figure
 
 

@@ -150,7 +150,8 @@ class _Drawing:
         sizes = self.parts.kit.sizes
         return sum(sizes[kind] for kind in list(sizes)[:list(sizes).index(piece.kind)]) + piece.part
 
-    def _state(self, stage: str, role: str, equilibrium: Equilibrium, placement: Placement | None = None) -> ViewerState:
+    def _state(self, stage: str, role: str, equilibrium: Equilibrium,
+               placement: Placement | None = None) -> ViewerState:
         placed, state = self.placed[role], equilibrium.state
         scene, nodes = placed.scene, _ring_nodes(placed.scene)
         x, R = scene.node_poses(state)

@@ -72,14 +72,16 @@ def test_assembly_plan_builds_the_design_again(parts, tmp_path):
         q[list(piece.parameters)] = piece.values
     for row, piece in zip(rows, placed.pieces):
         if row["kind"] == "angular":
-            assert abs(float(row["turn_deg"])) == pytest.approx(np.degrees(parts.kit["angular"][piece.part, 0]), abs=1e-4)
+            turn = np.degrees(parts.kit["angular"][piece.part, 0])
+            assert abs(float(row["turn_deg"])) == pytest.approx(turn, abs=1e-4)
             assert row["before"] and row["after"] and row["before"] != row["after"]
             continue
         part = realised[int(row["part"][1:]) - 1]
         for side, parameter in enumerate(piece.parameters, 1):
-            assert float(row[f"side_{side}_mm"]) == pytest.approx(part[("l1", "l2").index(row[f"side_{side}"])], abs=1e-4)
+            length = float(row[f"side_{side}_mm"])
+            assert length == pytest.approx(part[("l1", "l2").index(row[f"side_{side}"])], abs=1e-4)
             elements = scene.length_parameter == parameter
-            assert scene.rest_lengths(q)[elements].sum() * 1000 == pytest.approx(float(row[f"side_{side}_mm"]), abs=1e-4)
+            assert scene.rest_lengths(q)[elements].sum() * 1000 == pytest.approx(length, abs=1e-4)
             assert row[f"side_{side}_towards"].startswith("corner")
 
 

@@ -127,7 +127,8 @@ def test_svg_agrees_with_dxf(parts, documents, tmp_path):
         assert root.get("width") == "1000mm" and root.get("height") == "600mm"
         assert root.get("viewBox") == "0 0 1000 600"  # so one unit is a millimetre
         cut = next(g for g in root.iter(f"{SVG}g") if g.get("id") == "CUT")
-        circles = sorted((float(c.get("cx")), 600 - float(c.get("cy")), 2 * float(c.get("r"))) for c in cut.iter(f"{SVG}circle"))
+        circles = sorted((float(c.get("cx")), 600 - float(c.get("cy")), 2 * float(c.get("r")))
+                         for c in cut.iter(f"{SVG}circle"))
         wanted = sorted((*c.dxf.center.vec2, 2 * c.dxf.radius) for c in document.modelspace().query("CIRCLE"))
         np.testing.assert_allclose(circles, wanted, atol=1e-4)
         assert len(list(cut.iter(f"{SVG}polygon"))) == len(outlines(document.modelspace()))

@@ -36,9 +36,11 @@ def test_what_was_written_is_read(finished, shells):
     assert again.to_dict()["designs"][0]["assigned"]["exudyn"]["moved"] < 1e-8
 
 
-def test_other_designs_are_refused(finished, shells):
-    with pytest.raises(InputError, match="other designs"):
-        load_run(finished[1], shells[::-1])
+def test_designs_are_found_by_name(finished, shells):
+    assert [d.name for d in load_run(finished[1], shells[::-1]).designs] == ["first", "second"]
+    for given in (shells[:1], [*shells, shells[0]]):
+        with pytest.raises(InputError, match="not only once"):
+            load_run(finished[1], given)
 
 
 def test_changed_designs_are_noticed(finished, shells):

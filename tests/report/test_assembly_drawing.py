@@ -72,7 +72,8 @@ def test_cells_are_labelled_in_their_middle():
         "class": "umbrella", "name": "pair", "lengths": [[32, 33], [34, 35]],
         "base": {"vertices": [[0, 0], [40, 0], [20, 40 * s], [20, -40 * s]], "faces": [[0, 1, 2], [0, 3, 1]]}})
     found = cluster(design.groups, design.parameters, {"cell": 2})
-    figure = draw_assembly(parts_list(found.kit, found.assignment, [design]), "pair", design.scene().initial, "deployed")
+    parts = parts_list(found.kit, found.assignment, [design])
+    figure = draw_assembly(parts, "pair", design.scene().initial, "deployed")
     assert sum(text.get_text().startswith("C") for text in figure.axes[0].texts) == 2
 
 

@@ -105,8 +105,8 @@ def test_kit_scene_has_all_stages_and_parts(result, kit_page):
     assert sum(p.uses[0] for p in kit_page.parts) == result.designs[0].n_elements
     for n, design in enumerate(kit_page.designs):
         final = [s for s in design.states if s.final]
-        assert {(s.stage, s.role) for s in final} == {(stage, role) for stage in ("input", "direct", "relaxed", "assigned")
-                                                     for role in ("deployed", "rest")}
+        stages = ("input", "direct", "relaxed", "assigned")
+        assert {(s.stage, s.role) for s in final} == {(stage, role) for stage in stages for role in ("deployed", "rest")}
         scene, rods = result.designs[n].scene("deployed"), design.rods["deployed"]
         assert rods.rings.sum() == sum(len(chain.nodes) for chain in scene.chains)
         counts = np.bincount(rods.corner_parts, minlength=4)[:2]
@@ -197,7 +197,8 @@ def test_a_click_highlights_the_part(kit_page, tmp_path):
       const found = new Set();
       for (let y = 40; y < box.height && found.size < 4; y += 23) for (let x = 20; x < box.width; x += 31) {
         for (const name of ["pointerdown", "pointerup"])
-          canvas.dispatchEvent(new PointerEvent(name, {pointerId: 1, button: 0, clientX: box.left + x, clientY: box.top + y}));
+          canvas.dispatchEvent(new PointerEvent(
+            name, {pointerId: 1, button: 0, clientX: box.left + x, clientY: box.top + y}));
         const part = new URLSearchParams(location.hash.slice(1)).get("part");
         const pressed = document.querySelector("#legend button[aria-pressed=true]");
         if (part) found.add(part + "/" + (pressed ? pressed.textContent : "none"));
