@@ -8,7 +8,7 @@ from pathlib import Path
 HELP = "write cut lists, cut sheets, assembly plans and 3D files of a finished kit"
 DESCRIPTION = """Reads the folder that `kop optimize` wrote, and writes two folders: workshop (cut list, bills, assembly plans as
 CSV; cut sheets and corner templates at true scale as SVG, and DXF with the extra [fab]) and desk (the assigned designs'
-states as OBJ centre lines, PLY and GLB solids, VTU with strains and stresses with the extra [mesh], tables as CSV)."""
+states as OBJ centre lines, PLY and GLB solids, VTU with strains and stresses, and tables as CSV)."""
 EXAMPLES = """examples:
   kop export out/kit models/conformals --out out/files --unit m"""
 
@@ -17,7 +17,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("result", type=Path, metavar="RESULT", help="folder of a finished run")
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="folder of the designs that it was made from")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write to")
-    parser.add_argument("--unit", default="m", choices=("mm", "cm", "m"), help="the designs' unit of length (default: m)")
+    parser.add_argument("--unit", required=True, choices=("mm", "cm", "m"), help="the designs' unit of length")
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
 
 
@@ -25,7 +25,7 @@ def run(args: argparse.Namespace) -> int:
     from importlib.util import find_spec
 
     from ..errors import InputError
-    from ..io.export import DESK_FORMATS, export_desk, export_workshop
+    from ..io.export import export_desk, export_workshop
     from ..io.pieces import parts_list_of
     from ..io.designs import load_designs
     from ..io.results import load_result
@@ -38,9 +38,8 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("holds no design of this name", source=args.folder, field="name", value=missing[0])
     result = load_run(args.result, [known[name] for name in names])
     sheets = ["svg"] + (["dxf"] if find_spec("ezdxf") else [])
-    states = [name for name in DESK_FORMATS if name != "vtu" or find_spec("meshio")]
     done = export_workshop(parts_list_of(result), args.out / "workshop", args.unit, formats=sheets,
                            overwrite=args.overwrite)
-    done += export_desk(result, args.out / "desk", formats=states, overwrite=args.overwrite)
+    done += export_desk(result, args.out / "desk", overwrite=args.overwrite)
     sys.stdout.write(f"{len(done)} files in {args.out}\n")
     return 0
