@@ -19,6 +19,7 @@ from ..scene.builder import SceneBuilder
 from ..scene.scene import Scene
 from ..scene.state import State
 from .base import ElementGroup
+from .curves import direction
 from .network import CurveNetwork, Strand
 from .straightening import StraightStrand, straighten
 
@@ -102,7 +103,7 @@ def lay_out(network: CurveNetwork, elements: int) -> ShellLayout:
 
     Raises InputError where one corner can't follow a span.
     """
-    straights = [straighten(strand, network.joints, f"curves[{k}].points") for k, strand in enumerate(network.strands)]
+    straights = [straighten(strand, network.joints) for strand in network.strands]
     build = _LayoutBuilder(network, elements)
     for number, straight in enumerate(straights):
         build.add(number, straight)
@@ -175,7 +176,7 @@ class _LayoutBuilder:
             angles = straight.angles[k], straight.angles[k] + straight.corners[k]
             tail, head = strand.joints[k], strand.joints[following[k]]
             middle = begin + l1 / (l1 + l2) * (end - begin)
-            x = self.network.joints[tail] + l1 * _direction(angles[0]) if straight.exact[k] else \
+            x = self.network.joints[tail] + l1 * direction(angles[0]) if straight.exact[k] else \
                 0.5 * (self.network.joints[tail] + self.network.joints[head])
             body = self._bodies(strand, np.array([middle]), x[None], angles[0])[0]
             self.corners.append((body, int(corner[k])))
@@ -210,7 +211,7 @@ class _LayoutBuilder:
         parameter = int(self._parameters([length], lengths=True)[0])
         joint, at, angle = strand.joints[end], strand.stations[end], straight.angles[end]
         x, far = self.network.joints[joint], at + length if end else at - length
-        tip = x + (length if end else -length) * _direction(angle)
+        tip = x + (length if end else -length) * direction(angle)
         body = self._bodies(strand, np.array([far]), tip[None], angle)[0]
         if end:
             self._piece(number, strand, (joint, body), (at, far), (x, tip), angle, parameter)
@@ -314,7 +315,3 @@ def _planar_motions(x: np.ndarray, angles: np.ndarray) -> np.ndarray:
     half = 0.5 * phi
     a = np.where(np.abs(half) < 1e-4, 1 - half**2 / 3, half / np.tan(np.where(half == 0, 1.0, half)))
     return np.stack([a * p[0] + half * p[1], a * p[1] - half * p[0], phi], axis=1)
-
-
-def _direction(angle: float) -> np.ndarray:
-    return np.array([np.cos(angle), np.sin(angle)])

@@ -41,8 +41,8 @@ def find_crossings(curves: Sequence[Curve]) -> list[Crossing]:
     Raises InputError for curves that cross themselves, touch without crossing, or run along each other.
     """
     size, chords = size_of(curves), [_Chords(curve) for curve in curves]
-    for k, (curve, own) in enumerate(zip(curves, chords)):
-        _refuse_self_crossing(curve, own, k)
+    for curve, own in zip(curves, chords):
+        _refuse_self_crossing(curve, own)
     found = []
     for a, b in _overlapping(chords, TOLERANCE * size):
         found += _cross_pair(curves, chords, a, b, size)
@@ -55,8 +55,8 @@ def given_crossings(curves: Sequence[Curve], listed: Sequence[Mapping[str, Any]]
     Raises InputError naming the entry that can't be found, is ambiguous or is there twice.
     """
     size, chords = size_of(curves), [_Chords(curve) for curve in curves]
-    for k, (curve, own) in enumerate(zip(curves, chords)):
-        _refuse_self_crossing(curve, own, k)
+    for curve, own in zip(curves, chords):
+        _refuse_self_crossing(curve, own)
     found: list[Crossing] = []
     for n, entry in enumerate(listed):
         field = f"crossings[{n}]"
@@ -113,8 +113,8 @@ def _cross_pair(
     touching = np.flatnonzero(meeting & (np.abs(sine) < np.sin(_LEAST_ANGLE)))
     if len(touching):
         x = curves[a].position(s[touching[0]])
-        raise InputError(f"touches curves[{b}] or runs along it near ({x[0]:.6g}, {x[1]:.6g}) instead of crossing it",
-                         field=f"curves[{a}].points")
+        raise InputError(f"touches {curves[b].field} or runs along it near ({x[0]:.6g}, {x[1]:.6g}) instead of "
+                         "crossing it", field=curves[a].field)
     keep = np.flatnonzero(meeting & (gap <= 1e-9 * size))
     return _distinct(curves, (a, b), _clip(curves[a], s[keep]), _clip(curves[b], t[keep]), margin)
 
@@ -185,7 +185,7 @@ def _distinct(curves, pair, s: np.ndarray, t: np.ndarray, margin: float) -> list
     return found
 
 
-def _refuse_self_crossing(curve: Curve, chords: _Chords, number: int) -> None:
+def _refuse_self_crossing(curve: Curve, chords: _Chords) -> None:
     """Raise InputError when two pieces that aren't neighbours meet."""
     n = len(chords.start)
     i, j = np.nonzero(np.triu(_boxes_meet(chords, chords, 0.0), 2))
@@ -198,7 +198,7 @@ def _refuse_self_crossing(curve: Curve, chords: _Chords, number: int) -> None:
     crossing = np.flatnonzero(over_i & over_j)
     if len(crossing):
         x = chords.start[i[crossing[0]]]
-        raise InputError(f"the curve crosses itself near ({x[0]:.6g}, {x[1]:.6g})", field=f"curves[{number}].points")
+        raise InputError(f"the curve crosses itself near ({x[0]:.6g}, {x[1]:.6g})", field=curve.field)
 
 
 def _side(start: np.ndarray, end: np.ndarray, point: np.ndarray) -> np.ndarray:

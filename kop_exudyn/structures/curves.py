@@ -24,12 +24,14 @@ _CUSP = 1e-3
 class Curve(ABC):
     """A planar curve, evaluated at arc lengths s of any shape.
 
+    field : what messages call it: where its points are given in a design file
     length : total arc length
     closed : whether it is a loop; then s is taken modulo the length
     stations : (m + 1,) increasing arc lengths from 0 to the length, fine enough for a coarse polyline
     sags : (m,) bounds of the distance between the curve and the chord over each interval of stations
     """
 
+    field: str
     length: float
     closed: bool
     stations: np.ndarray
@@ -45,7 +47,7 @@ class Curve(ABC):
         inside, turns = self._inside(s)
         x, angle, _ = self._evaluate(inside.ravel())
         if not self.closed:
-            x = x + (s - inside).ravel()[:, None] * _direction(angle)
+            x = x + (s - inside).ravel()[:, None] * direction(angle)
         return x.reshape(*s.shape, 2)
 
     def angle(self, s: Any) -> np.ndarray:
@@ -59,7 +61,7 @@ class Curve(ABC):
 
     def tangent(self, s: Any) -> np.ndarray:
         """Unit tangents (..., 2)."""
-        return _direction(self.angle(s))
+        return direction(self.angle(s))
 
     def curvature(self, s: Any) -> np.ndarray:
         """Signed curvature (...), positive to the left; a polyline's vertices are left out."""
@@ -90,7 +92,7 @@ class Polyline(Curve):
 
     def __init__(self, points: Any, closed: bool = False, field: str = "points"):
         points = _checked(points, closed, field)
-        self.closed = closed
+        self.field, self.closed = field, closed
         self._vertices = np.concatenate([points, points[:1]]) if closed else points
         edges = np.diff(self._vertices, axis=0)
         lengths = np.hypot(*edges.T)
@@ -109,8 +111,8 @@ class Polyline(Curve):
     def _evaluate(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         stations = self.stations
         piece = np.clip(np.searchsorted(stations, s, side="right") - 1, 0, len(stations) - 2)
-        direction = _direction(self._angles[piece])
-        x = self._vertices[piece] + (s - stations[piece])[:, None] * direction
+        share = (s - stations[piece]) / (stations[piece + 1] - stations[piece])
+        x = self._vertices[piece] + share[:, None] * (self._vertices[piece + 1] - self._vertices[piece])
         return x, self._angle_at(s, piece), np.zeros(len(s))
 
     def _angle_at(self, s: np.ndarray, piece: np.ndarray) -> np.ndarray:
@@ -136,7 +138,7 @@ class Spline(Curve):
         from scipy.interpolate import CubicSpline
 
         points = _checked(points, closed, field)
-        self.closed = closed
+        self.field, self.closed = field, closed
         through = np.concatenate([points, points[:1]]) if closed else points
         knots = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(through, axis=0).T))])
         self._x = CubicSpline(knots, through, bc_type="periodic" if closed else "natural")
@@ -226,7 +228,8 @@ def _checked(points: Any, closed: bool, field: str) -> np.ndarray:
     return points
 
 
-def _direction(angle: np.ndarray) -> np.ndarray:
+def direction(angle: Any) -> np.ndarray:
+    """Unit vectors (..., 2) at angles (...), rad."""
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 

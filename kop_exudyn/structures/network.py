@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from .crossings import TOLERANCE, Crossing, find_crossings, given_crossings, size_of
-from .curves import Curve, curve_from_dict
+from .curves import Curve, curve_from_dict, direction
 
 _LEAST_LOOP = 3  # joints: two corners can't close a loop of straight pieces
 
@@ -41,6 +41,12 @@ class Strand:
         return len(self.joints) - (not self.closed)
 
     @cached_property
+    def ends(self) -> np.ndarray:
+        """(n_spans, 2) where each span begins and ends: index into `joints`; a loop's last one ends at the first."""
+        places = np.arange(len(self.joints))
+        return np.stack([places, np.roll(places, -1)], axis=1)[: self.n_spans]
+
+    @cached_property
     def spans(self) -> np.ndarray:
         """(n_spans, 2) stations where each span begins and ends; a loop's last one ends beyond its length."""
         following = np.append(self.stations[1:], self.stations[0] + self.curve.length)
@@ -60,7 +66,7 @@ class Strand:
     @property
     def tangents(self) -> np.ndarray:
         """(J, 2) unit tangents at the joints."""
-        return np.stack([np.cos(self.angles), np.sin(self.angles)], axis=1)
+        return direction(self.angles)
 
 
 @dataclass(frozen=True)
@@ -112,8 +118,8 @@ def network(
     if len(curves) < 2:
         raise InputError("a network needs at least two curves", field="curves")
     points = find_crossings(curves) if isinstance(crossings, str) else given_crossings(curves, crossings)
-    _refuse_triple_points(points, TOLERANCE * size_of(curves))
-    _refuse_unconnected(len(curves), points)
+    _refuse_triple_points(curves, points, TOLERANCE * size_of(curves))
+    _refuse_unconnected(curves, points)
     first_family, opens = families(len(curves), points)
     pairs = np.array([c.curves for c in points])
     pairs = np.where(first_family[:, None], pairs, pairs[:, ::-1])
@@ -159,43 +165,42 @@ def _strand(curve: Curve, number: int, crossings: Sequence[Crossing], free_ends:
     own = [(c.stations[c.curves.index(number)], n) for n, c in enumerate(crossings) if number in c.curves]
     own.sort()
     stations, joints = np.array([s for s, _ in own]), np.array([n for _, n in own])
-    field = f"curves[{number}].points"
     if curve.closed and len(own) < _LEAST_LOOP:
-        raise InputError(f"a closed curve needs at least {_LEAST_LOOP} joints, this one has {len(own)}", field=field)
+        raise InputError(f"a closed curve needs at least {_LEAST_LOOP} joints, this one has {len(own)}", field=curve.field)
     if len(own) == 1 and not free_ends:
-        raise InputError("nothing is left of a curve with one joint when its free ends are cut off", field=field)
+        raise InputError("nothing is left of a curve with one joint when its free ends are cut off",
+                         field=curve.field)
     head, tail = (0.0, 0.0) if curve.closed or not free_ends else (stations[0], curve.length - stations[-1])
     negligible = TOLERANCE * curve.length
     strand = Strand(curve, joints, stations, curve.angle(stations), *(x if x > negligible else 0.0 for x in (head, tail)))
     if len(strand.lengths) and strand.lengths.min() <= negligible:
-        raise InputError("two joints at the same place", field=field)
+        raise InputError("two joints at the same place", field=curve.field)
     return strand
 
 
-def _refuse_triple_points(crossings: Sequence[Crossing], tolerance: float) -> None:
+def _refuse_triple_points(curves: Sequence[Curve], crossings: Sequence[Crossing], tolerance: float) -> None:
     from scipy.spatial import cKDTree
 
     if not crossings:
         return
     for a, b in sorted(cKDTree([c.position for c in crossings]).query_pairs(tolerance)):
-        curves = sorted({*crossings[a].curves, *crossings[b].curves})
+        *others, last = (curves[k].field for k in sorted({*crossings[a].curves, *crossings[b].curves}))
         x = crossings[a].position
-        raise InputError(f"passes through one point ({x[0]:.6g}, {x[1]:.6g}) with curves "
-                         f"{', '.join(map(str, curves[:-1]))}: a joint holds two curves",
-                         field=f"curves[{curves[-1]}].points")
+        raise InputError(f"passes through one point ({x[0]:.6g}, {x[1]:.6g}) with {', '.join(others)}: a joint holds "
+                         "two curves", field=last)
 
 
-def _refuse_unconnected(n_curves: int, crossings: Sequence[Crossing]) -> None:
+def _refuse_unconnected(curves: Sequence[Curve], crossings: Sequence[Crossing]) -> None:
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
     pairs = np.array([c.curves for c in crossings], int).reshape(-1, 2)
-    lonely = np.flatnonzero(np.bincount(pairs.ravel(), minlength=n_curves) == 0)
+    lonely = np.flatnonzero(np.bincount(pairs.ravel(), minlength=len(curves)) == 0)
     if len(lonely):
-        raise InputError("crosses no other curve", field=f"curves[{lonely[0]}].points")
-    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(n_curves, n_curves))
+        raise InputError("crosses no other curve", field=curves[lonely[0]].field)
+    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(curves),) * 2)
     parts, label = connected_components(graph, directed=False)
     if parts > 1:
         stray = int(np.flatnonzero(label != label[0])[0])
-        raise InputError(f"is not connected with curve 0: the network falls into {parts} parts",
-                         field=f"curves[{stray}].points")
+        raise InputError(f"is not connected with {curves[0].field}: the network falls into {parts} parts",
+                         field=curves[stray].field)

@@ -48,11 +48,9 @@ def _directed_edges(network: CurveNetwork) -> tuple[np.ndarray, np.ndarray, np.n
     """Joints (m, 2), outgoing angles (m,) and signed areas (m,) of the directed edges; 2k and 2k + 1 are opposite."""
     edges, angles, areas = [], [], []
     for strand in network.strands:
-        n = len(strand.joints)
-        for k, span in enumerate(strand.spans):
-            ends = strand.joints[k], strand.joints[(k + 1) % n]
+        for k, (span, ends) in enumerate(zip(strand.spans, strand.joints[strand.ends].tolist())):
             x = strand.curve.position(np.linspace(*span, _SAMPLES + 1))
-            x[0], x[-1] = network.joints[list(ends)]
+            x[0], x[-1] = network.joints[ends]
             area = 0.5 * np.sum(x[:-1, 0] * x[1:, 1] - x[1:, 0] * x[:-1, 1])
             edges += [ends, ends[::-1]]
             angles += [strand.angles[k], strand.angles[k] + strand.turnings[k] + np.pi]

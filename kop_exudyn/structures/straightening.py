@@ -48,7 +48,7 @@ class StraightStrand:
     exact: np.ndarray
 
 
-def straighten(strand: Strand, joints: np.ndarray, field: str = "curve") -> StraightStrand:
+def straighten(strand: Strand, joints: np.ndarray) -> StraightStrand:
     """Straight pieces for one strand of a network with joints (n, 2).
 
     Raises InputError where a span turns further than one corner can follow.
@@ -57,7 +57,7 @@ def straighten(strand: Strand, joints: np.ndarray, field: str = "curve") -> Stra
     worst = np.argmax(np.abs(strand.turnings)) if strand.n_spans else 0
     if strand.n_spans and abs(strand.turnings[worst]) > _MOST_TURNING:
         raise InputError(f"turns by {np.degrees(abs(strand.turnings[worst])):.0f} degrees between two joints: one "
-                         "corner can't follow that; add joints", field=field)
+                         "corner can't follow that; add joints", field=strand.curve.field)
     shift = np.zeros(len(strand.joints))
     if not spans.proper(shift, _AIMED_RATIOS[0]).all():
         shift = next((found for found in (_least_shift(spans, len(shift), ratio) for ratio in _AIMED_RATIOS)
@@ -84,9 +84,7 @@ class _Spans:
 
     @classmethod
     def of(cls, strand: Strand, joints: np.ndarray) -> _Spans:
-        m, n = strand.n_spans, len(strand.joints)
-        start = np.arange(m)
-        end = (start + 1) % n
+        start, end = strand.ends.T
         chord = joints[strand.joints[end]] - joints[strand.joints[start]]
         direction = np.arctan2(chord[:, 1], chord[:, 0])
         first = _wrapped(strand.angles[start] - direction)
