@@ -4,8 +4,9 @@ Plain Newton on slender rods crawls along the valley of the stretch-stiff energy
 at the stress that the last step predicted, sigma <- (K/L)(e + B d), while the gradient stays exact: the mixed-stress
 iteration of slender-shell continuation (Magisano, Leonetti, Garcea, CMAME 2017). Safeguards: a cap on rotations a
 step, a shift wherever a pivot is not positive, a watchdog that returns to the best state when several steps bring
-nothing, and after that a fall-back to energy descent with line search. A converged state that the pivots show to be unstable is left along its softest mode: a saddle is never
-returned.
+nothing, and after that a fall-back to energy descent with line search. A converged state that the pivots show to be
+unstable is left along its softest mode, as is one that the iteration creeps up to: a saddle is never returned. Cold
+starts that bring nothing are tried once more by way of axially soft rods (softened.py).
 """
 from __future__ import annotations
 
