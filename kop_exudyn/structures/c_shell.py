@@ -28,7 +28,6 @@ from .network import CurveNetwork, network_from_dict
 from .network_faces import triangulate
 
 _OPENING_STEP = 0.1  # rad of mean joint angle a step
-_SHORTEST = 0.1  # of the median length: shorter pieces are no sensible parts
 _LARGEST_CORNER = 2.5  # rad
 _IMPERFECTION = 1e-3  # of the size, height of the shallow surface that imperfect rest shapes follow
 _REFINEMENTS = 3  # of the target's triangles
@@ -52,11 +51,9 @@ class CShell(Design):
         self.name, self.network, self.model = name, network, model
         self.opening, self.side, self.rest = opening, side, rest
         self.layout = lay_out(network, model.elements)
-        self.parameters, self.groups, self.joints = self.layout.parameters, self.layout.groups, self.layout.joints
-        lengths = self.layout.is_length
-        shortest = _SHORTEST * float(np.median(self.parameters[lengths]))
-        self.lower = np.where(lengths, np.minimum(shortest, self.parameters), -_LARGEST_CORNER)
-        self.upper = np.where(lengths, np.inf, _LARGEST_CORNER)
+        numbering = self.layout.numbering
+        self.parameters, self.groups, self.joints = numbering.parameters, numbering.groups, self.layout.joints
+        self.lower, self.upper = numbering.bounds(_LARGEST_CORNER)
         self._triangles = triangulate(network)
         flat, straight = self.layout.hinges[:, network.opens].mean(axis=1)
         self.flat_angle = float(flat)

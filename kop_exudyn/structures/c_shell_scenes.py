@@ -18,9 +18,9 @@ from ..rods.sections import Material, Section
 from ..scene.builder import SceneBuilder
 from ..scene.scene import Scene
 from ..scene.state import State
-from .base import ElementGroup
 from .curves import direction
 from .network import CurveNetwork, Strand
+from .numbering import Numbering, StrandNumbers, number_pieces
 from .straightening import StraightStrand, straighten
 
 PLANAR = (2, 3, 4)  # height, and turns out of the plane: what an assembly lying on the floor can't do
@@ -61,13 +61,13 @@ class HalfPiece:
 
 @dataclass(frozen=True)
 class ShellLayout:
-    """All bodies of a C-shell in the plane, for both of its designs, and the straightened design's parameters.
+    """All bodies of a C-shell in the plane, for both of its designs.
 
     smooth, straight (n, 3) : x, y and direction (rad) of every body
     hinges (2, n_joints) : joint angles of the smooth and of the straightened design
     halves (n_joints,) : half-turns between the hinge and the second rod's direction of travel
     pieces : half-pieces; corners (m, 2) : body and parameter of every corner
-    parameters (nq,) q; is_length (nq,) bool; groups : the elements
+    numbering : the straightened design's parameters and elements
     """
 
     network: CurveNetwork
@@ -77,9 +77,7 @@ class ShellLayout:
     halves: np.ndarray
     pieces: list[HalfPiece]
     corners: np.ndarray
-    parameters: np.ndarray
-    is_length: np.ndarray
-    groups: list[ElementGroup]
+    numbering: Numbering
 
     @property
     def joints(self) -> np.ndarray:
@@ -99,15 +97,16 @@ class ShellLayout:
 
 
 def lay_out(network: CurveNetwork, elements: int) -> ShellLayout:
-    """Place all bodies and number the parameters: a strand's half-pieces, its free ends, its corners; then the next.
+    """Straighten all strands, number their parameters, and place all bodies.
 
     Raises InputError where one corner can't follow a span.
     """
     straights = [straighten(strand, network.joints) for strand in network.strands]
+    numbering = number_pieces(network.strands, [s.lengths for s in straights], [s.corners for s in straights])
     build = _LayoutBuilder(network, elements)
-    for number, straight in enumerate(straights):
-        build.add(number, straight)
-    return build.finish(straights)
+    for number, (straight, numbers) in enumerate(zip(straights, numbering.strands)):
+        build.add(number, straight, numbers)
+    return build.finish(straights, numbering)
 
 
 def shell_scene(layout: ShellLayout, model: RodModel, *, straight: bool, planar: bool = False,
@@ -118,7 +117,7 @@ def shell_scene(layout: ShellLayout, model: RodModel, *, straight: bool, planar:
     imperfection : height, relative to the size, of a shallow surface that the rods' rest shapes follow
     """
     network = layout.network
-    build = SceneBuilder(len(layout.parameters) if straight else 0)
+    build = SceneBuilder(len(layout.numbering.parameters) if straight else 0)
     poses = layout.straight if straight else layout.smooth
     lift = 0.5 * model.rod_offset
     bodies = build.bodies(np.concatenate([poses[:, :2], _heights(layout, lift)[:, None]], axis=1), rotation_z(poses[:, 2]))
@@ -142,48 +141,33 @@ def shell_scene(layout: ShellLayout, model: RodModel, *, straight: bool, planar:
 
 
 class _LayoutBuilder:
-    """Collects bodies and parameters strand by strand."""
+    """Collects bodies strand by strand."""
 
     def __init__(self, network: CurveNetwork, elements: int):
         self.network, self.elements = network, elements
         flat = np.concatenate([network.joints, network.directions[:, :1]], axis=1)
         self.smooth, self.straight = [flat], [flat.copy()]
-        self.n_bodies, self.values, self.is_length = len(flat), [], []
+        self.n_bodies = len(flat)
         self.pieces: list[HalfPiece] = []
         self.corners: list[tuple[int, int]] = []
-        self.full: list[tuple[int, int]] = []
-        self.ends: list[tuple[int]] = []
 
-    def add(self, number: int, straight: StraightStrand) -> None:
-        strand, first = straight.strand, len(self.values)
-        n, following = strand.n_spans, np.roll(np.arange(len(strand.joints)), -1)
-        self._parameters(straight.lengths.ravel(), lengths=True)
-        out, into = first + 2 * np.arange(n), first + 2 * np.arange(n) + 1
-        tips = [self._tip(number, straight, end) for end in (0, -1)]
-        corner = self._parameters(straight.corners, lengths=False)
-        self.full += zip(into[:-1].tolist(), out[1:].tolist())
-        if strand.closed:
-            self.full.append((int(into[-1]), int(out[0])))
-        elif n:
-            self._outer(tips[0], int(out[0]))
-            self._outer(tips[1], int(into[-1]))
-        elif None in tips:
-            self.ends += [(tip,) for tip in tips if tip is not None]
-        else:
-            self.full.append(tuple(tips))
-        for k, (begin, end) in enumerate(strand.spans):
+    def add(self, number: int, straight: StraightStrand, numbers: StrandNumbers) -> None:
+        strand = straight.strand
+        for end, parameter in zip((0, -1), numbers.tips):
+            if parameter is not None:
+                self._tip(number, straight, end, parameter)
+        for k, ((tail, head), (begin, end)) in enumerate(zip(strand.joints[strand.ends], strand.spans)):
             l1, l2 = straight.lengths[k]
             angles = straight.angles[k], straight.angles[k] + straight.corners[k]
-            tail, head = strand.joints[k], strand.joints[following[k]]
+            a, b = self.network.joints[[tail, head]]
             middle = begin + l1 / (l1 + l2) * (end - begin)
-            x = self.network.joints[tail] + l1 * direction(angles[0]) if straight.exact[k] else \
-                0.5 * (self.network.joints[tail] + self.network.joints[head])
+            x = a + l1 * direction(angles[0]) if straight.exact[k] else 0.5 * (a + b)
             body = self._bodies(strand, np.array([middle]), x[None], angles[0])[0]
-            self.corners.append((body, int(corner[k])))
-            self._piece(number, strand, (tail, body), (begin, middle), (self.network.joints[tail], x), angles[0], out[k])
-            self._piece(number, strand, (body, head), (middle, end), (x, self.network.joints[head]), angles[1], into[k])
+            self.corners.append((body, int(numbers.corners[k])))
+            self._piece(number, strand, (tail, body), (begin, middle), (a, x), angles[0], numbers.before[k])
+            self._piece(number, strand, (body, head), (middle, end), (x, b), angles[1], numbers.after[k])
 
-    def finish(self, straights: list[StraightStrand]) -> ShellLayout:
+    def finish(self, straights: list[StraightStrand], numbering: Numbering) -> ShellLayout:
         network = self.network
         smooth, straight = np.concatenate(self.smooth), np.concatenate(self.straight)
         turn = network.directions[:, 1] - network.directions[:, 0]
@@ -191,24 +175,15 @@ class _LayoutBuilder:
         shift = np.array([[straights[c].angles[k] - straights[c].strand.angles[k] for c, k in zip(pair, place)]
                           for pair, place in zip(network.pairs, network.places)])
         straight[: network.n_joints, 2] += shift[:, 0]
-        groups = [ElementGroup("linear", np.array(rows, int)) for rows in (self.full, self.ends) if rows]
-        groups += [ElementGroup("angular", np.array(self.corners, int)[:, 1:])] if self.corners else []
         return ShellLayout(
             network, smooth, straight, np.stack([hinge, hinge + shift[:, 1] - shift[:, 0]]),
             np.round((turn - hinge) / np.pi).astype(int), self.pieces, np.array(self.corners, int).reshape(-1, 2),
-            np.array(self.values), np.array(self.is_length), groups)
+            numbering)
 
-    def _outer(self, tip: int | None, inner: int) -> None:
-        """The element at a strand's end: with the free end, or one length alone."""
-        self.ends.append((inner,)) if tip is None else self.full.append((tip, inner))
-
-    def _tip(self, number: int, straight: StraightStrand, end: int) -> int | None:
-        """The free end before the first (0) or after the last (-1) joint; its parameter."""
+    def _tip(self, number: int, straight: StraightStrand, end: int, parameter: int) -> None:
+        """The free end before the first (0) or after the last (-1) joint."""
         strand = straight.strand
         length = strand.tail if end else strand.head
-        if not length:
-            return None
-        parameter = int(self._parameters([length], lengths=True)[0])
         joint, at, angle = strand.joints[end], strand.stations[end], straight.angles[end]
         x, far = self.network.joints[joint], at + length if end else at - length
         tip = x + (length if end else -length) * direction(angle)
@@ -217,7 +192,6 @@ class _LayoutBuilder:
             self._piece(number, strand, (joint, body), (at, far), (x, tip), angle, parameter)
         else:
             self._piece(number, strand, (body, joint), (far, at), (tip, x), angle, parameter)
-        return parameter
 
     def _piece(self, number, strand: Strand, ends, stations, points, angle: float, parameter: int) -> None:
         share = np.linspace(0, 1, self.elements + 1)
@@ -232,12 +206,6 @@ class _LayoutBuilder:
         self.straight.append(np.concatenate([x, np.full((len(s), 1), angle)], axis=1))
         self.n_bodies += len(s)
         return np.arange(self.n_bodies - len(s), self.n_bodies)
-
-    def _parameters(self, values, lengths: bool) -> np.ndarray:
-        start = len(self.values)
-        self.values += [float(v) for v in values]
-        self.is_length += [lengths] * len(values)
-        return np.arange(start, len(self.values))
 
 
 class _EndNodes:

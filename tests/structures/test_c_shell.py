@@ -143,7 +143,7 @@ def test_the_target_passes_through_the_smooth_designs_joints(shell):
 def test_an_imperfection_unfolds_the_buckling_of_the_rest_state(conformal):
     """Planar rest states stay in the plane; imperfect ones leave it without ever meeting a saddle."""
     planar, imperfect = (design_from_dict({**small(conformal), "rest": rest}) for rest in ("planar", "imperfect"))
-    change = np.where(planar.layout.is_length, 2e-3, 0.02) * np.random.default_rng(1).normal(size=len(planar.parameters))
+    change = np.where(planar.layout.numbering.is_length, 2e-3, 0.02) * np.random.default_rng(1).normal(size=len(planar.parameters))
     flat, bulged = (solve(d.systems["rest"], d.parameters + change, None, d.roles[1].opening) for d in (planar, imperfect))
     assert np.abs(flat.state.positions[:, 2]).max() == 0
     assert np.abs(bulged.state.positions[:, 2]).max() > 1e-3 and bulged.escapes == 0
