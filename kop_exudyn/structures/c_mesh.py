@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .curve_network import Run
 from .grid import Grid
+from .network import Strand
 
 
 @dataclass(frozen=True)
@@ -46,14 +46,14 @@ class CMeshResiduals:
 
 def c_mesh_residuals(grid: Grid) -> CMeshResiduals:
     """How far a grid's network and surface are from those of a C-mesh."""
-    local = grid.surface.at(grid.network.positions)
+    local = grid.surface.at(grid.network.joints)
     principal = local.principal()[0]
     k = max(float(np.sqrt(np.mean(principal**2))), np.finfo(float).tiny)
     K, H = local.gauss / k**2, local.mean / k
     pair = np.stack([K, H], axis=1)
     values, vectors = np.linalg.eigh(np.cov(pair.T, bias=True))
     a, b = vectors[:, 0]
-    normal = [_normal_curvatures(grid, run) / k for run in grid.network.runs]
+    normal = [_normal_curvatures(grid, strand) / k for strand in grid.network.strands]
     return CMeshResiduals(
         chebyshev=_chebyshev(grid), gauss=float(K.std()), weingarten=float(np.sqrt(max(values[0], 0.0))),
         coefficients=(float(a), float(b), -float(pair.mean(axis=0) @ (a, b))),
@@ -61,10 +61,9 @@ def c_mesh_residuals(grid: Grid) -> CMeshResiduals:
         straight=float(np.sqrt(np.mean(np.concatenate(normal) ** 2))))
 
 
-def _normal_curvatures(grid: Grid, run: Run) -> np.ndarray:
+def _normal_curvatures(grid: Grid, strand: Strand) -> np.ndarray:
     """At the joints of one curve."""
-    local = grid.surface.at(run.curve.position(run.parameters))
-    return local.normal_curvatures(run.curve.velocity(run.parameters))
+    return grid.surface.at(grid.network.joints[strand.joints]).normal_curvatures(strand.tangents)
 
 
 def _chebyshev(grid: Grid) -> float:
@@ -76,9 +75,10 @@ def _chebyshev(grid: Grid) -> float:
 def _meshes(grid: Grid) -> list[tuple[float, float, float, float]]:
     """Arc lengths of the sides, in order, of all quadrilaterals between four neighbouring joints."""
     sides: dict[int, dict[int, tuple[int, float]]] = defaultdict(dict)  # joint -> neighbour -> (curve, length)
-    for lamella in grid.straight.lamellas:
-        for (i, j, *_), length in zip(lamella.run.spans, lamella.spans.lengths):
-            sides[i][j] = sides[j][i] = (lamella.run.number, float(length))
+    for curve, lamella in enumerate(grid.straight.lamellas):
+        strand = lamella.strand
+        for (i, j), length in zip(strand.joints[strand.ends].tolist(), lamella.spans.lengths):
+            sides[i][j] = sides[j][i] = (curve, float(length))
     found = {}
     for i, around in sides.items():
         for j, (first, s) in around.items():

@@ -19,7 +19,7 @@ from ..scene.builder import SceneBuilder
 from ..scene.scene import Scene
 from ..scene.state import State
 from .curves import direction
-from .network import CurveNetwork, Strand
+from .network import CurveNetwork, Strand, middle_joint
 from .numbering import Numbering, StrandNumbers, number_pieces
 from .straightening import StraightStrand, straighten
 
@@ -133,7 +133,7 @@ def shell_scene(layout: ShellLayout, model: RodModel, *, straight: bool, planar:
         length = {"parameter": piece.parameter} if straight else {"length": np.diff(piece.stations)}
         build.rod(nodes, model.stiffness, section=model.section, rest_strain=strain, **length)
     build.mean_angle(hinges[network.opens])
-    build.pin(int(bodies[np.argmin(np.hypot(*(network.joints - network.joints.mean(axis=0)).T))]))
+    build.pin(int(bodies[middle_joint(network.joints)]))
     if planar:
         for body in bodies:
             build.pin(int(body), PLANAR)

@@ -15,9 +15,9 @@ import numpy as np
 from ..errors import InputError, SimulationFailure
 from ..rods.sections import Material, Section, material_from_dict, section_from_dict
 from .base import Design, Role, Target, register
-from .curve_network import CurveNetwork
 from .grid_network import network_on
 from .lamellas import straighten_on
+from .network import CurveNetwork
 from .surfaces import AnalyticSurface, Surface
 
 if TYPE_CHECKING:
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from ..scene.scene import Scene
     from .grid_scene import GridScene
 
-_SHORTEST = 0.1  # of the median length: shorter pieces are no sensible parts
 _LARGEST_CORNER = 1.5  # rad
 _TARGET_CELLS = 96  # of the target surface, along each parameter
 _MARGIN = 0.75  # of the longest span, by which the target goes beyond the outermost joints
@@ -49,12 +48,9 @@ class Grid(Design):
         self.name, self.surface, self.network = name, surface, network
         self.section, self.material, self.elements_per_piece = section, material, elements_per_piece
         self.straight = straighten_on(surface, network)
-        self.parameters = self.straight.parameters
-        lengths = self.straight.is_length
-        shortest = _SHORTEST * float(np.median(self.parameters[lengths]))
-        self.lower = np.where(lengths, shortest, -_LARGEST_CORNER)
-        self.upper = np.where(lengths, np.inf, _LARGEST_CORNER)
-        self.groups = self.straight.groups
+        numbering = self.straight.numbering
+        self.parameters, self.groups = numbering.parameters, numbering.groups
+        self.lower, self.upper = numbering.bounds(_LARGEST_CORNER)
         self.joints = self._model.joints
 
     @cached_property
@@ -82,7 +78,7 @@ class Grid(Design):
 
         The diagonal is that of the joints' bounding box: the surface itself may go on.
         """
-        joints = self.surface.points(self.network.positions)
+        joints = self.surface.points(self.network.joints)
         vertices, faces = _triangulated(self.surface, self.network, joints, _MARGIN * self._longest_span())
         return Target(vertices, faces, joints, float(np.linalg.norm(np.ptp(joints, axis=0))))
 
@@ -98,7 +94,7 @@ def _triangulated(surface: Surface, network: CurveNetwork, joints: np.ndarray,
     """
     from scipy.spatial import cKDTree
 
-    uv = network.positions
+    uv = network.joints
     metric = surface.at(uv).metric
     widening = margin / np.sqrt(metric[:, [0, 1], [0, 1]].min(axis=0))
     axes = [np.linspace(low, high, _TARGET_CELLS + 1) for low, high in zip(

@@ -6,10 +6,12 @@ from typing import Any, Mapping
 import numpy as np
 
 from ..errors import InputError
-from .curve_network import CurveNetwork, network_of
-from .planar_curve import PlanarCurve
+from .curves import Curve, Polyline, Spline, curve_from_dict
+from .network import CurveNetwork, network
 from .surface_tracing import Domain, asymptotic_line, curvature_line, geodesic
 from .surfaces import Surface
+
+_SAMPLES = 65  # points of each curve, besides its own stations, that must lie on the surface
 
 
 def network_on(surface: Surface, data: Mapping[str, Any]) -> CurveNetwork:
@@ -26,14 +28,14 @@ def network_on(surface: Surface, data: Mapping[str, Any]) -> CurveNetwork:
         raise InputError(f"unknown network (known: {', '.join(_READERS)})", field="network.type", value=data["type"])
     curves = _READERS[data["type"]](surface, data)
     for curve in curves:
-        samples = curve.position(curve.samples())
+        samples = curve.position(np.union1d(curve.stations, np.linspace(0, curve.length, _SAMPLES)))
         inside = surface.contains(samples)
         if not inside.all():
             raise InputError("leaves the surface", field=curve.field, value=samples[int(np.argmin(inside))].tolist())
-    return network_of(curves)
+    return network(curves)
 
 
-def _isolines(surface: Surface, data: Mapping[str, Any]) -> list[PlanarCurve]:
+def _isolines(surface: Surface, data: Mapping[str, Any]) -> list[Curve]:
     values = []
     for name in ("u", "v"):
         lines = np.array(data[name], float)
@@ -41,42 +43,41 @@ def _isolines(surface: Surface, data: Mapping[str, Any]) -> list[PlanarCurve]:
             raise InputError("must be two or more increasing numbers", field=f"network.{name}", value=data[name])
         values.append(lines)
     u, v = values
-    of_u = [PlanarCurve([[a, v[0]], [a, v[-1]]], smooth=False, field=f"network.u[{k}]") for k, a in enumerate(u)]
-    of_v = [PlanarCurve([[u[0], b], [u[-1], b]], smooth=False, field=f"network.v[{k}]") for k, b in enumerate(v)]
+    of_u = [Polyline([[a, v[0]], [a, v[-1]]], field=f"network.u[{k}]") for k, a in enumerate(u)]
+    of_v = [Polyline([[u[0], b], [u[-1], b]], field=f"network.v[{k}]") for k, b in enumerate(v)]
     return of_u + of_v
 
 
-def _geodesics(surface: Surface, data: Mapping[str, Any]) -> list[PlanarCurve]:
+def _geodesics(surface: Surface, data: Mapping[str, Any]) -> list[Curve]:
     domain = Domain(surface, *data["domain"])
     return [_traced(f"network.through[{k}]", geodesic, domain, (u, v), angle)
             for k, (u, v, angle) in enumerate(data["through"])]
 
 
-def _asymptotic(surface: Surface, data: Mapping[str, Any]) -> list[PlanarCurve]:
+def _asymptotic(surface: Surface, data: Mapping[str, Any]) -> list[Curve]:
     return _field_lines(surface, data, asymptotic_line)
 
 
-def _curvature(surface: Surface, data: Mapping[str, Any]) -> list[PlanarCurve]:
+def _curvature(surface: Surface, data: Mapping[str, Any]) -> list[Curve]:
     return _field_lines(surface, data, curvature_line)
 
 
-def _field_lines(surface: Surface, data: Mapping[str, Any], trace: Any) -> list[PlanarCurve]:
+def _field_lines(surface: Surface, data: Mapping[str, Any], trace: Any) -> list[Curve]:
     domain = Domain(surface, *data["domain"])
     names = ("points", "second_points" if "second_points" in data else "points")
     return [_traced(f"network.{name}[{k}]", trace, domain, point, family)
             for family, name in enumerate(names) for k, point in enumerate(data[name])]
 
 
-def _traced(field: str, trace: Any, domain: Domain, point: Any, option: Any) -> PlanarCurve:
+def _traced(field: str, trace: Any, domain: Domain, point: Any, option: Any) -> Curve:
     try:
-        return PlanarCurve(trace(domain, point, option), field=field)
+        return Spline(trace(domain, point, option), field=field)
     except InputError as error:
         raise InputError(error.message, field=field, value=error.value) from None
 
 
-def _curves(surface: Surface, data: Mapping[str, Any]) -> list[PlanarCurve]:
-    return [PlanarCurve(c["points"], c.get("closed", False), c.get("type", "spline") == "spline",
-                        field=f"network.curves[{k}]") for k, c in enumerate(data["curves"])]
+def _curves(surface: Surface, data: Mapping[str, Any]) -> list[Curve]:
+    return [curve_from_dict(entry, f"network.curves[{k}]") for k, entry in enumerate(data["curves"])]
 
 
 _READERS = {"isolines": _isolines, "geodesics": _geodesics, "asymptotic": _asymptotic, "curvature": _curvature,

@@ -21,8 +21,8 @@ import numpy as np
 from scipy.integrate import cumulative_simpson
 
 from ..errors import InputError
-from .base import ElementGroup
-from .curve_network import CurveNetwork, Run
+from .network import CurveNetwork, Strand
+from .numbering import Numbering, StrandNumbers, number_pieces
 from .surfaces import Surface
 
 _SAMPLES = 65  # a span: Simpson's rule is then exact to about 1e-8 on curves that make sensible lamellas
@@ -51,98 +51,73 @@ class Spans:
 
 @dataclass(frozen=True)
 class Lamella:
-    """One straightened curve: its spans, and numbers of their parameters in the design's vector q.
+    """One straightened curve: its spans, and where their parameters stand in the design's vector q.
 
-    tangents (k, 3), normals (k, 3) : unit vectors at its joints
-    before, after, corners (n,) : numbers of the two lengths and of the angle of each span
+    tangents (J, 3), normals (J, 3) : unit vectors at its joints
     """
 
-    run: Run
+    strand: Strand
     spans: Spans
     tangents: np.ndarray
     normals: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
-    corners: np.ndarray
+    numbers: StrandNumbers
 
 
 @dataclass(frozen=True)
 class Lamellas:
-    """parameters (nq,) q; is_length (nq,) bool; groups: the elements; lamellas: one a curve."""
+    """numbering: parameters and elements; lamellas: one a curve."""
 
-    parameters: np.ndarray
-    is_length: np.ndarray
-    groups: list[ElementGroup]
+    numbering: Numbering
     lamellas: list[Lamella]
 
 
 def straighten_on(surface: Surface, network: CurveNetwork) -> Lamellas:
     """Straight pieces and corners for a network on a surface. Raises InputError for spans that turn too far."""
-    values: list[np.ndarray] = []
-    full, ends, corners, lamellas = [], [], [], []
-    first = 0
-    for run in network.runs:
-        spans = _spans(surface, run)
-        n = len(spans.turns)
-        before, after, angular = (first + np.arange(n) * step + shift for step, shift in ((2, 0), (2, 1), (1, 2 * n)))
-        values += [np.stack([spans.before, spans.after], axis=1).ravel(), spans.turns]
-        first += 3 * n
-        full.append(np.stack([after[:-1], before[1:]], axis=1))
-        if run.curve.closed:
-            full.append(np.array([[after[-1], before[0]]]))
-        else:
-            ends.append(np.array([[before[0]], [after[-1]]]))
-        corners.append(angular[:, None])
-        velocity = run.curve.velocity(run.parameters)
-        local = surface.at(run.curve.position(run.parameters))
-        tangents = local.push(velocity)
+    straight = [_spans(surface, strand) for strand in network.strands]
+    numbering = number_pieces(network.strands, [np.stack([spans.before, spans.after], axis=1) for spans in straight],
+                              [spans.turns for spans in straight])
+    lamellas = []
+    for strand, spans, numbers in zip(network.strands, straight, numbering.strands):
+        local = surface.at(network.joints[strand.joints])
+        tangents = local.push(strand.tangents)
         tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
-        lamellas.append(Lamella(run, spans, tangents, local.normals, before, after, angular))
-    is_length = np.ones(first, bool)
-    is_length[np.concatenate(corners).ravel()] = False
-    groups = [ElementGroup("linear", np.concatenate(rows)) for rows in (full, ends) if sum(map(len, rows))]
-    groups.append(ElementGroup("angular", np.concatenate(corners)))
-    return Lamellas(np.concatenate(values), is_length, groups, lamellas)
+        lamellas.append(Lamella(strand, spans, tangents, local.normals, numbers))
+    return Lamellas(numbering, lamellas)
 
 
-def _spans(surface: Surface, run: Run) -> Spans:
-    rows = [_span(*_developed(surface, run, u, v)) for _, _, u, v in run.spans]
-    spans = Spans(*np.array(rows).T)
-    worst = int(np.argmax(np.abs(spans.turns)))
-    if abs(spans.turns[worst]) > _LARGEST_TURN:
-        raise InputError(f"turns by {spans.turns[worst]:.2f} rad between joints {worst} and {worst + 1}: more curves "
-                         "across it are needed", field=run.curve.field)
-    return spans
+def _spans(surface: Surface, strand: Strand) -> Spans:
+    lengths, directions = _developed(surface, strand)
+    turns = directions[:, -1]
+    worst = int(np.argmax(np.abs(turns)))
+    if abs(turns[worst]) > _LARGEST_TURN:
+        raise InputError(f"turns by {turns[worst]:.2f} rad between joints {worst} and {worst + 1}: more curves "
+                         "across it are needed", field=strand.curve.field)
+    chords = [cumulative_simpson(along(directions), x=lengths)[:, -1] for along in (np.cos, np.sin)]
+    bases, slopes = np.hypot(*chords), np.arctan2(chords[1], chords[0])
+    a, b = np.tan(slopes), np.tan(turns - slopes)
+    shares = (b * (a + b) + 0.5 * _BLEND**2) / ((a + b) ** 2 + _BLEND**2)
+    shares = np.clip(shares, _NEAREST, 1 - _NEAREST)
+    heights = corner_height(bases, shares, turns)
+    before, after = np.hypot([shares * bases, (1 - shares) * bases], heights)
+    return Spans(lengths[:, -1], before, after, turns, shares, heights)
 
 
-def _developed(surface: Surface, run: Run, u: float, v: float) -> tuple[np.ndarray, np.ndarray]:
-    """Arc lengths and directions (m,) along the flat lamella between two joints, both from 0."""
-    stations = np.linspace(u, v, _SAMPLES)
-    velocity = run.curve.velocity(stations)
-    local = surface.at(run.curve.position(stations))
-    speed = np.linalg.norm(local.push(velocity), axis=1)
-    lengths = cumulative_simpson(speed, x=stations, initial=0.0)
-    return lengths, cumulative_simpson(speed * local.normal_curvatures(velocity), x=stations, initial=0.0)
+def _developed(surface: Surface, strand: Strand) -> tuple[np.ndarray, np.ndarray]:
+    """Arc lengths and directions (n_spans, m) along the flat lamella between joints, both from 0."""
+    stations = np.linspace(*strand.spans.T, _SAMPLES, axis=-1)
+    along = strand.curve.tangent(stations).reshape(-1, 2)
+    local = surface.at(strand.curve.position(stations).reshape(-1, 2))
+    speed = np.linalg.norm(local.push(along), axis=1)
+    bending = speed * local.normal_curvatures(along)
+    lengths, directions = (cumulative_simpson(rate.reshape(stations.shape), x=stations, initial=0.0)
+                           for rate in (speed, bending))
+    return lengths, directions
 
 
-def _span(lengths: np.ndarray, directions: np.ndarray) -> tuple[float, float, float, float, float, float]:
-    """The fields of `Spans`, from the flat lamella between two joints."""
-    chord = complex(cumulative_simpson(np.cos(directions), x=lengths)[-1],
-                    cumulative_simpson(np.sin(directions), x=lengths)[-1])
-    base, turn = abs(chord), float(directions[-1])
-    slope = np.angle(chord)
-    a, b = np.tan(slope), np.tan(turn - slope)
-    share = (b * (a + b) + 0.5 * _BLEND**2) / ((a + b) ** 2 + _BLEND**2)
-    share = float(np.clip(share, _NEAREST, 1 - _NEAREST))
-    height = corner_height(base, share, turn)
-    before, after = np.hypot([share * base, (1 - share) * base], height)
-    return float(lengths[-1]), float(before), float(after), turn, share, height
-
-
-def corner_height(base: float, share: float, turn: float) -> float:
+def corner_height(base: np.ndarray | float, share: np.ndarray | float, turn: np.ndarray | float) -> np.ndarray | float:
     """Signed distance of the corner from the chord `base`, for a total turn |turn| < pi/2; it bulges against it.
 
     With t = tan(turn): atan(h / f D) + atan(h / (1 - f) D) = turn gives t h^2 + D h - f (1 - f) D^2 t = 0.
     """
     t, product = np.tan(turn), share * (1 - share)
-    return -float(2 * base * product * t / (1 + np.sqrt(1 + 4 * product * t * t)))
+    return -2 * base * product * t / (1 + np.sqrt(1 + 4 * product * t * t))

@@ -160,6 +160,12 @@ def families(n_curves: int, crossings: Sequence[Crossing]) -> tuple[np.ndarray, 
     return of[:, 0] <= of[:, 1], of[:, 0] != of[:, 1]
 
 
+def middle_joint(positions: np.ndarray) -> int:
+    """The joint nearest to the mean of all (n, 2 or 3); of equally near ones the first: round-off must not choose."""
+    distances = np.linalg.norm(positions - positions.mean(axis=0), axis=1)
+    return int(np.argmax(distances <= distances.min() + TOLERANCE * distances.max()))
+
+
 def _strand(curve: Curve, number: int, crossings: Sequence[Crossing], free_ends: bool) -> Strand:
     """A curve's joints in order."""
     own = [(c.stations[c.curves.index(number)], n) for n, c in enumerate(crossings) if number in c.curves]
@@ -178,7 +184,9 @@ def _strand(curve: Curve, number: int, crossings: Sequence[Crossing], free_ends:
     return strand
 
 
-def _refuse_triple_points(curves: Sequence[Curve], crossings: Sequence[Crossing], tolerance: float) -> None:
+def _refuse_triple_points(
+    curves: Sequence[Curve], crossings: Sequence[Crossing], tolerance: float
+) -> None:
     from scipy.spatial import cKDTree
 
     if not crossings:

@@ -60,7 +60,7 @@ def test_a_corner_over_its_chord_turns_by_its_angle(share, turn):
 
 def test_arcs_have_their_corners_where_the_tangents_meet():
     grid = design_from_dict(CYLINDER)
-    arcs = [lamella for lamella in grid.straight.lamellas if np.ptp(grid.network.positions[lamella.run.joints, 1]) < 1e-9]
+    arcs = [lamella for lamella in grid.straight.lamellas if np.ptp(grid.network.joints[lamella.strand.joints, 1]) < 1e-9]
     assert len(arcs) == 3
     for lamella in arcs:
         np.testing.assert_allclose(lamella.spans.turns, -0.4, rtol=1e-7)  # the normal points outwards
@@ -107,7 +107,7 @@ def test_elements_cover_the_parameters_once(saddle):
     assert {key: len(value) for key, value in by_kind.items()} == {("linear", 2): 16, ("linear", 1): 16, ("angular", 1): 24}
     used = np.concatenate([indices.ravel() for indices in by_kind.values()])
     np.testing.assert_array_equal(np.sort(used), np.arange(len(saddle.parameters)))
-    assert not saddle.straight.is_length[by_kind["angular", 1]].any()
+    assert not saddle.straight.numbering.is_length[by_kind["angular", 1]].any()
     assert (saddle.lower < saddle.parameters).all() and (saddle.parameters < saddle.upper).all()
     shares = np.concatenate([lamella.spans.shares for lamella in saddle.straight.lamellas])
     assert shares.min() > 0.4 and shares.max() < 0.6
@@ -123,7 +123,7 @@ def test_strong_axes_stand_along_the_surface_normal(saddle):
     scene = saddle.scene()
     state = scene.with_driven(scene.initial, saddle.parameters)
     R = scene.node_poses(state)[1]
-    normals = saddle.surface.at(saddle.network.positions).normals
+    normals = saddle.surface.at(saddle.network.joints).normals
     np.testing.assert_allclose(scene.initial.rotations[saddle.joints][:, :, 2], normals, atol=1e-12)
     stations = np.isin(scene.node_body, saddle.joints)
     body = np.searchsorted(saddle.joints, scene.node_body[stations])
@@ -135,7 +135,7 @@ def test_corners_turn_about_the_lamellas_thin_direction(saddle):
     """Positive angles turn the leaving piece towards the normal."""
     scene = saddle.scene()
     for lamella in saddle.straight.lamellas:
-        for number in lamella.corners:
+        for number in lamella.numbers.corners:
             hinge = int(np.flatnonzero(scene.driven.parameters == number)[0])
             hinge = int(scene.driven.dofs[hinge]) - 6 * scene.n_bodies
             leave = int(np.flatnonzero(scene.node_hinge == hinge)[0])
@@ -210,7 +210,7 @@ def test_curvature_lines_of_a_minimal_surface_give_the_grid_of_its_isolines():
                "points": [[x, x + 0.01] for x in lines(0.4, 4)]}
     grids = [design_from_dict(grid_data({"name": "enneper", "scale": 1.0}, n)) for n in (
         network, {"type": "isolines", "u": lines(0.4, 4), "v": [x + 0.01 for x in lines(0.4, 4)]})]
-    corners = [np.sort(grid.parameters[~grid.straight.is_length]) for grid in grids]
+    corners = [np.sort(grid.parameters[~grid.straight.numbering.is_length]) for grid in grids]
     np.testing.assert_allclose(*corners, atol=1e-6)
 
 
@@ -279,7 +279,9 @@ def test_shipped_designs_keep_to_their_surfaces(repository):
      "network.through[0]"),
     ({"network": {"type": "asymptotic", "domain": [[1, -1], [-1, 1]], "points": [[0, 0]]}}, "network.domain"),
     ({"network": {"type": "curves", "curves": [{"points": [[0, 0], [1, 0]]}, {"points": [[0, 1], [1, 1]]}]}},
-     "network.curves"),
+     "network.curves[0].points: crosses no other"),
+    ({"network": {"type": "curves", "curves": [{"points": [[0, 0], [1, y]]} for y in (0, 1, 2)]}},
+     "network.curves[2].points: passes through one point (0, 0) with network.curves[0].points, network.curves[1].points"),
     ({"elements_per_piece": 0}, "elements_per_piece"),
     ({"sections": 3}, "sections"),
 ])
@@ -301,7 +303,7 @@ def test_mesh_files_lie_beside_the_design(write_json_file, tmp_path):
     (tmp_path / "patch.obj").write_text("\n".join(rows))
     path = write_json_file("meshed.json", {**SADDLE, "surface": {"type": "mesh", "file": "patch.obj"}})
     grid, exact = load_design(path), design_from_dict(SADDLE)
-    lengths = exact.straight.is_length
+    lengths = exact.straight.numbering.is_length
     np.testing.assert_allclose(grid.parameters[lengths], exact.parameters[lengths], rtol=1e-3)
     np.testing.assert_allclose(grid.parameters[~lengths], exact.parameters[~lengths], atol=2e-3)
     beyond = json.loads(path.read_text())

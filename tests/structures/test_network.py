@@ -6,7 +6,7 @@ from hypothesis import assume, given, settings, strategies as st
 from kop_exudyn.errors import InputError
 from kop_exudyn.structures.crossings import find_crossings
 from kop_exudyn.structures.curves import Polyline, Spline
-from kop_exudyn.structures.network import network, network_from_dict
+from kop_exudyn.structures.network import middle_joint, network, network_from_dict
 from kop_exudyn.structures.network_faces import faces_of, triangulate
 from kop_exudyn.structures.straightening import straighten
 
@@ -156,6 +156,13 @@ def test_mistakes(curves, more, message):
 def test_two_curves_that_cross_twice_need_a_place():
     with pytest.raises(InputError, match=r"crossings\[0\].*cross 2 times"):
         build([ring(), line((-2, 0), (2, 0))], crossings=[{"curves": [0, 1]}])
+
+
+def test_round_off_does_not_choose_the_middle_joint():
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], float)
+    rng = np.random.default_rng(2)
+    assert {middle_joint(corners + 1e-13 * rng.normal(size=(4, 2))) for _ in range(20)} == {0}
+    assert middle_joint(np.concatenate([corners, [[0.1, 0.0]]])) == 4
 
 
 # -- straight pieces ---------------------------------------------------------------------------------------------------
