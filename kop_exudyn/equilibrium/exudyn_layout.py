@@ -16,11 +16,11 @@ from ..scene.scene import Scene
 
 @dataclass(frozen=True)
 class Carrier:
-    """The item that represents one frame: a body (hinge -1), or what turns with one of its hinges.
+    """The item that represents one frame: a body (hinge -1), or what turns with one of its hinges, at its centre.
 
     node : Exudyn node
     frame (3, 3) : the node's axes in the frame's axes
-    rigid : whether the node belongs to an added rigid body (needed where rods sit off the frame's origin)
+    rigid : whether the node belongs to an added rigid body (needed where rods or hinges sit off the frame's origin)
     """
 
     body: int
@@ -73,11 +73,14 @@ def layout_of(scene: Scene) -> Layout:
     for body in range(scene.n_bodies):
         frames.setdefault((body, -1), [])
     carriers, ties = {}, []
+    eccentric = {int(scene.node_body[n]) for n in np.flatnonzero(scene.node_hinge >= 0)
+                 if scene.hinge_centre[scene.node_hinge[n]].any()}
     count = len(scene_node)
     for key, nodes in sorted(frames.items()):
         origins = [scene_node[n] for n in nodes]
         centred = [n for n, o in zip(nodes, origins) if not scene.node_offset[o].any()]
-        if centred and all(not scene.node_offset[o].any() for o in origins):
+        plain = all(not scene.node_offset[o].any() for o in origins) and not (key[1] < 0 and key[0] in eccentric)
+        if centred and plain:
             carriers[key] = Carrier(*key, centred[0], scene.node_frame[scene_node[centred[0]]], False)
         else:
             carriers[key] = Carrier(*key, count, np.eye(3), True)

@@ -14,7 +14,7 @@ from time import perf_counter
 import numpy as np
 
 from ..errors import SimulationFailure
-from ..rods.rotations import exp_so3, log_so3, rotation_z
+from ..rods.rotations import axes_along_z, exp_so3, log_so3
 from ..scene.scene import Scene
 from ..scene.state import State
 from .exudyn_layout import Carrier, layout_of
@@ -170,10 +170,8 @@ class ExudynModel:
                         for c in layout.carriers.values() if c.rigid}
         for key, node, frame, offset in layout.ties:
             carrier = layout.carriers[key]
-            marker = self._marker(carrier.node) if not offset.any() else mbs.AddMarker(
-                item.MarkerBodyRigid(bodyNumber=self._bodies[carrier.node], localPosition=(offset / self._length).tolist()))
             mbs.AddObject(item.ObjectJointGeneric(
-                markerNumbers=[marker, self._marker(node)], constrainedAxes=[1] * 6,
+                markerNumbers=[self._marker_at(carrier, offset), self._marker(node)], constrainedAxes=[1] * 6,
                 rotationMarker0=carrier.frame.T, rotationMarker1=frame.T))
         driven = set((scene.driven.dofs - 6 * scene.n_bodies).tolist())
         fixed = scene.pinned[6 * scene.n_bodies:]
@@ -182,15 +180,17 @@ class ExudynModel:
             if hinge < 0:
                 continue
             hub = layout.carriers[body, -1]
-            markers = [self._marker(hub.node), self._marker(carrier.node)]
+            markers = [self._marker_at(hub, scene.hinge_centre[hinge]), self._marker(carrier.node)]
             if hinge in driven or fixed[hinge]:
                 joint = mbs.AddObject(item.ObjectJointGeneric(
                     markerNumbers=markers, constrainedAxes=[1] * 6, rotationMarker0=hub.frame.T,
                     rotationMarker1=carrier.frame.T))
                 self._turned.append((joint, hinge, hub))
             else:
+                along = axes_along_z(scene.hinge_axis[hinge])
                 mbs.AddObject(item.ObjectJointRevoluteZ(
-                    markerNumbers=markers, rotationMarker0=hub.frame.T, rotationMarker1=carrier.frame.T))
+                    markerNumbers=markers, rotationMarker0=hub.frame.T @ along,
+                    rotationMarker1=carrier.frame.T @ along))
 
     def _add_pins(self) -> None:
         """Ground joints for pinned and driven coordinates; one body is held where the scene holds none.
@@ -224,7 +224,7 @@ class ExudynModel:
                 hub = layout.carriers[carrier.body, -1]
                 for owner, sign in ((hub, 1.0), (carrier, -1.0)):
                     load = self._load(item.LoadTorqueVector, owner.node, bodyFixed=True)
-                    self._torques.append((load, sign * owner.frame.T[:, 2]))
+                    self._torques.append((load, sign * owner.frame.T @ scene.hinge_axis[hinge]))
         if scene.weight is not None:
             ends = np.unique(layout.element_nodes)
             self._weights = [(int(n), self._load(item.LoadForceVector, n)) for n in ends]
@@ -241,7 +241,7 @@ class ExudynModel:
             hub = layout.carriers[carrier.body, -1]
             for owner, sign in ((hub, -1.0), (carrier, 1.0)):
                 load = self._load(item.LoadTorqueVector, owner.node, bodyFixed=True)
-                self._hinge_wrenches.append((hinge, load, sign * owner.frame.T[:, 2]))
+                self._hinge_wrenches.append((hinge, load, sign * owner.frame.T @ scene.hinge_axis[hinge]))
 
     def _spring(self, first: int, second: int) -> tuple[object, int, int]:
         """A connector between two bodies that lends Exudyn's Jacobian the stiffness of what acts between them.
@@ -257,6 +257,13 @@ class ExudynModel:
 
     def _load(self, kind: type, node: int, **options: object) -> object:
         return self._mbs.AddLoad(kind(markerNumber=self._marker(node), loadVector=[0, 0, 0], **options))
+
+    def _marker_at(self, carrier: Carrier, offset: np.ndarray) -> object:
+        """A marker off a carrier's origin, where the carrier is a rigid body, or in it."""
+        if not offset.any():
+            return self._marker(carrier.node)
+        return self._mbs.AddMarker(item.MarkerBodyRigid(
+            bodyNumber=self._bodies[carrier.node], localPosition=(offset / self._length).tolist()))
 
     def _marker(self, node: int) -> object:
         if node not in self._markers:
@@ -292,9 +299,9 @@ class ExudynModel:
             mbs.SetNodeParameter(node, "referenceCoordinates", row.tolist())
         for beam, length in zip(self._beams, lengths):
             mbs.SetObjectParameter(beam, "length", float(length / self._length))
+        turns = scene.hinge_turns(eq.state.angles)
         for joint, hinge, hub in self._turned:
-            turn = rotation_z(eq.state.angles[hinge])
-            mbs.SetObjectParameter(joint, "rotationMarker0", hub.frame.T @ turn)
+            mbs.SetObjectParameter(joint, "rotationMarker0", hub.frame.T @ turns[hinge])
         for ground, joint, body, turned in self._pins:
             mbs.SetMarkerParameter(ground, "localPosition", (eq.state.positions[body] / self._length).tolist())
             if turned:
@@ -356,11 +363,14 @@ class ExudynModel:
         out = np.zeros((layout.n_nodes, 6))
         out[beams, :3], out[beams, 3:] = x[layout.scene_node[beams]], log_so3(R[layout.scene_node[beams]])
         out[beams, :3] /= self._length
+        turns = self.scene.hinge_turns(state.angles)
         for carrier in layout.carriers.values():
             if carrier.rigid:
-                turn = rotation_z(state.angles[carrier.hinge]) if carrier.hinge >= 0 else np.eye(3)
-                out[carrier.node, :3] = state.positions[carrier.body] / self._length
-                out[carrier.node, 3:] = log_so3(state.rotations[carrier.body] @ turn)
+                position, rotation = state.positions[carrier.body], state.rotations[carrier.body]
+                if carrier.hinge >= 0:
+                    position = position + rotation @ self.scene.hinge_centre[carrier.hinge]
+                    rotation = rotation @ turns[carrier.hinge]
+                out[carrier.node, :3], out[carrier.node, 3:] = position / self._length, log_so3(rotation)
         return out
 
     def _state(self, solution: np.ndarray, near: State) -> State:
@@ -374,7 +384,8 @@ class ExudynModel:
         for (body, hinge), carrier in self.layout.carriers.items():
             if hinge >= 0:
                 turn = rotations[body].T @ R[carrier.node] @ carrier.frame.T
-                measured = np.arctan2(turn[1, 0], turn[0, 0])
+                sine = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+                measured = np.arctan2(sine @ self.scene.hinge_axis[hinge], np.trace(turn) - 1)
                 angles[hinge] += np.remainder(measured - near.angles[hinge] + np.pi, 2 * np.pi) - np.pi
         return State(positions, rotations, angles)
 

@@ -11,7 +11,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..rods.element import length_derivative
-from ..rods.rotations import rotation_z
 from ..scene.scene import Scene
 from ..scene.state import State
 from .direction import border_of, bordered_solve
@@ -245,13 +244,13 @@ class Sensitivities:
 def _weight_gradient_per_length(scene: Scene, state: State) -> np.ndarray:
     """d/dL (E, 14) of the dead load's generalised forces on an element's unknowns."""
     half = -0.5 * scene.weight
+    arms, rates = scene.node_arms(state)
     out = np.zeros((len(scene.elements), 14))
     for end in range(2):
         node = scene.elements[:, end]
         Rb = state.rotations[scene.node_body[node]]
-        y = np.einsum("nij,nj->ni", rotation_z(scene.node_angles(state)[node]), scene.node_offset[node])
         force = np.einsum("nji,nj->ni", Rb, half)
         out[:, 7 * end: 7 * end + 3] = half
-        out[:, 7 * end + 3: 7 * end + 6] = np.cross(y, force)
-        out[:, 7 * end + 6] = (y[:, 0] * force[:, 1] - y[:, 1] * force[:, 0]) * (scene.node_hinge[node] >= 0)
+        out[:, 7 * end + 3: 7 * end + 6] = np.cross(arms[node], force)
+        out[:, 7 * end + 6] = np.einsum("ni,ni->n", rates[node], force)
     return out

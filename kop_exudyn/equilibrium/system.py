@@ -93,10 +93,10 @@ class System:
         if order == HESSIAN:
             self.values[:] = 0.0
         elastic, load = assemble_rods(
-            order, state.positions, state.rotations, state.angles, scene.node_body, scene.node_hinge, self._plain,
-            scene.node_frame, scene.node_offset, scene.elements, self.lengths, scene.rest_strain, scene.stiffness,
-            self._weight, self.predicted_stress, mixed, s.rows, s.slots, self.gradient, self.values, self.strain,
-            self.strain_displacement,
+            order, state.positions, state.rotations, state.angles, scene.hinge_axis, scene.hinge_centre,
+            scene.node_body, scene.node_hinge, self._plain, scene.node_frame, scene.node_offset, scene.elements,
+            self.lengths, scene.rest_strain, scene.stiffness, self._weight, self.predicted_stress, mixed, s.rows,
+            s.slots, self.gradient, self.values, self.strain, self.strain_displacement,
         )
         potential = elastic + load
         for term, rows, slots in zip(scene.terms, s.term_rows, s.term_slots):

@@ -147,6 +147,14 @@ def rotation_z(angle: np.ndarray | float) -> np.ndarray:
     return exp_so3(np.stack([np.zeros_like(angle), np.zeros_like(angle), angle], axis=-1))
 
 
+def axes_along_z(axis: np.ndarray) -> np.ndarray:
+    """A rotation (3, 3) whose z axis is a unit vector (3,); the identity for z itself."""
+    x = np.eye(3)[np.argmin(np.abs(axis))]
+    x = x - (x @ axis) * axis
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(axis, x), axis])
+
+
 def exp_se3(h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Rigid motions of twists h = (u, phi) (..., 6): translations (..., 3) and rotations (..., 3, 3).
 

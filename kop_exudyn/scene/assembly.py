@@ -13,43 +13,64 @@ ENERGY, GRADIENT, HESSIAN = 0, 1, 2
 
 
 @nb.njit(cache=True)
-def node_pose(xb, Rb, a, plain, C, o, x, R, ZC, y):
-    """Pose (x, R) of a node, with ZC = Z(a) C and y = Z(a) o left behind for the variations."""
+def node_pose(xb, Rb, h, angles, axes, centres, plain, C, o, x, R, EC, y):
+    """Pose (x, R) of a node behind hinge h (-1: none), with EC = E(a) C and y = p + E(a) o left for the variations.
+
+    E(a) = cos a I + sin a hat(n) + (1 - cos a) n n^T turns about the hinge's axis n.
+    """
     if plain:
         for r in range(3):
             x[r] = xb[r]
             for c in range(3):
                 R[r, c] = Rb[r, c]
         return
-    co, si = math.cos(a), math.sin(a)
-    y[0], y[1], y[2] = co * o[0] - si * o[1], si * o[0] + co * o[1], o[2]
-    for c in range(3):
-        ZC[0, c] = co * C[0, c] - si * C[1, c]
-        ZC[1, c] = si * C[0, c] + co * C[1, c]
-        ZC[2, c] = C[2, c]
+    if h < 0:
+        for r in range(3):
+            y[r] = o[r]
+            for c in range(3):
+                EC[r, c] = C[r, c]
+    else:
+        n, p = axes[h], centres[h]
+        co, si = math.cos(angles[h]), math.sin(angles[h])
+        along = (1.0 - co) * (n[0] * o[0] + n[1] * o[1] + n[2] * o[2])
+        y[0] = p[0] + co * o[0] + si * (n[1] * o[2] - n[2] * o[1]) + along * n[0]
+        y[1] = p[1] + co * o[1] + si * (n[2] * o[0] - n[0] * o[2]) + along * n[1]
+        y[2] = p[2] + co * o[2] + si * (n[0] * o[1] - n[1] * o[0]) + along * n[2]
+        for c in range(3):
+            along = (1.0 - co) * (n[0] * C[0, c] + n[1] * C[1, c] + n[2] * C[2, c])
+            EC[0, c] = co * C[0, c] + si * (n[1] * C[2, c] - n[2] * C[1, c]) + along * n[0]
+            EC[1, c] = co * C[1, c] + si * (n[2] * C[0, c] - n[0] * C[2, c]) + along * n[1]
+            EC[2, c] = co * C[2, c] + si * (n[0] * C[1, c] - n[1] * C[0, c]) + along * n[2]
     for r in range(3):
         x[r] = xb[r] + Rb[r, 0] * y[0] + Rb[r, 1] * y[1] + Rb[r, 2] * y[2]
         for c in range(3):
-            R[r, c] = Rb[r, 0] * ZC[0, c] + Rb[r, 1] * ZC[1, c] + Rb[r, 2] * ZC[2, c]
+            R[r, c] = Rb[r, 0] * EC[0, c] + Rb[r, 1] * EC[1, c] + Rb[r, 2] * EC[2, c]
 
 
 @nb.njit(cache=True)
-def node_map(Rb, hinged, C, ZC, y, T):
-    """T (6,7): node increments (dx, w) from body increments and hinge angle.
+def node_map(Rb, h, axes, centres, C, EC, y, T, d):
+    """T (6,7): node increments (dx, w) from body increments and hinge angle, with d = n x (y - p) left behind.
 
-    dx = dx_b - R_b hat(y) w_b + R_b (e_z x y) da,   w = (ZC)^T w_b + C^T e_z da
+    dx = dx_b - R_b hat(y) w_b + R_b d da,   w = (EC)^T w_b + C^T n da
     """
-    h = 1.0 if hinged else 0.0
     for r in range(3):
         for c in range(3):
             T[r, c] = 1.0 if r == c else 0.0
             T[3 + r, c] = 0.0
-            T[3 + r, 3 + c] = ZC[c, r]
+            T[3 + r, 3 + c] = EC[c, r]
         T[r, 3] = -(Rb[r, 1] * y[2] - Rb[r, 2] * y[1])
         T[r, 4] = -(Rb[r, 2] * y[0] - Rb[r, 0] * y[2])
         T[r, 5] = -(Rb[r, 0] * y[1] - Rb[r, 1] * y[0])
-        T[r, 6] = h * (Rb[r, 1] * y[0] - Rb[r, 0] * y[1])
-        T[3 + r, 6] = h * C[2, r]
+        T[r, 6] = 0.0
+        T[3 + r, 6] = 0.0
+    if h < 0:
+        return
+    n, p = axes[h], centres[h]
+    a0, a1, a2 = y[0] - p[0], y[1] - p[1], y[2] - p[2]
+    d[0], d[1], d[2] = n[1] * a2 - n[2] * a1, n[2] * a0 - n[0] * a2, n[0] * a1 - n[1] * a0
+    for r in range(3):
+        T[r, 6] = Rb[r, 0] * d[0] + Rb[r, 1] * d[1] + Rb[r, 2] * d[2]
+        T[3 + r, 6] = C[0, r] * n[0] + C[1, r] * n[1] + C[2, r] * n[2]
 
 
 @nb.njit(cache=True)
@@ -89,11 +110,11 @@ def transform_rows(M, at6, plain, T, out, at7):
 
 
 @nb.njit(cache=True)
-def map_curvature(Rb, hinged, C, ZC, y, force, moment, H, at):
+def map_curvature(Rb, h, axes, EC, y, T, d, force, moment, H, at):
     """Add the second variation of the node map, contracted with the node's force (global) and moment (node axes).
 
-    f = R_b^T force:  w.(f y^T)w - (f.y) w.w,  w.((e_z x y) x f) da,  f.(e_z x (e_z x y)) da^2,
-    and half of w.ZC (C^T e_z x moment) da.
+    f = R_b^T force, b = C^T n:  w.(f y^T)w - (f.y) w.w,  w.(d x f) da,  f.(n x d) da^2,  and half of
+    w.EC (b x moment) da.
     """
     f0 = Rb[0, 0] * force[0] + Rb[1, 0] * force[1] + Rb[2, 0] * force[2]
     f1 = Rb[0, 1] * force[0] + Rb[1, 1] * force[1] + Rb[2, 1] * force[2]
@@ -105,23 +126,24 @@ def map_curvature(Rb, hinged, C, ZC, y, force, moment, H, at):
     H[at + 3, at + 4] += 0.5 * (f0 * y[1] + f1 * y[0])
     H[at + 3, at + 5] += 0.5 * (f0 * y[2] + f2 * y[0])
     H[at + 4, at + 5] += 0.5 * (f1 * y[2] + f2 * y[1])
-    if not hinged:
+    if h < 0:
         return
-    b0, b1, b2 = C[2, 0], C[2, 1], C[2, 2]
+    n = axes[h]
+    b0, b1, b2 = T[3, 6], T[4, 6], T[5, 6]
     t0 = b1 * moment[2] - b2 * moment[1]
     t1 = b2 * moment[0] - b0 * moment[2]
     t2 = b0 * moment[1] - b1 * moment[0]
-    # (e_z x y) x f with e_z x y = (-y1, y0, 0)
-    H[at + 3, at + 6] += y[0] * f2 + 0.5 * (ZC[0, 0] * t0 + ZC[0, 1] * t1 + ZC[0, 2] * t2)
-    H[at + 4, at + 6] += y[1] * f2 + 0.5 * (ZC[1, 0] * t0 + ZC[1, 1] * t1 + ZC[1, 2] * t2)
-    H[at + 5, at + 6] += -y[1] * f1 - y[0] * f0 + 0.5 * (ZC[2, 0] * t0 + ZC[2, 1] * t1 + ZC[2, 2] * t2)
-    H[at + 6, at + 6] -= f0 * y[0] + f1 * y[1]
+    H[at + 3, at + 6] += d[1] * f2 - d[2] * f1 + 0.5 * (EC[0, 0] * t0 + EC[0, 1] * t1 + EC[0, 2] * t2)
+    H[at + 4, at + 6] += d[2] * f0 - d[0] * f2 + 0.5 * (EC[1, 0] * t0 + EC[1, 1] * t1 + EC[1, 2] * t2)
+    H[at + 5, at + 6] += d[0] * f1 - d[1] * f0 + 0.5 * (EC[2, 0] * t0 + EC[2, 1] * t1 + EC[2, 2] * t2)
+    H[at + 6, at + 6] += (f0 * (n[1] * d[2] - n[2] * d[1]) + f1 * (n[2] * d[0] - n[0] * d[2])
+                          + f2 * (n[0] * d[1] - n[1] * d[0]))
 
 
 @nb.njit(cache=True)
 def assemble_rods(
-    order, positions, rotations, angles, node_body, node_hinge, plain, frame, offset, elements, L, gamma, K, weight,
-    stress, mixed, rows, slots, gradient, values, strain, B14,
+    order, positions, rotations, angles, axes, centres, node_body, node_hinge, plain, frame, offset, elements, L, gamma,
+    K, weight, stress, mixed, rows, slots, gradient, values, strain, B14,
 ):
     """Elastic energy and load potential; at GRADIENT also the gradient, at HESSIAN also values, and B14 (E,6,14).
 
@@ -129,7 +151,8 @@ def assemble_rods(
     scene has none. strain e (E, 6) is always written.
     """
     x0, x1, R0, R1 = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
-    Z0, Z1, y0, y1 = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.zeros(3)
+    E0, E1, y0, y1 = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.zeros(3)
+    d0, d1 = np.zeros(3), np.zeros(3)
     T0, T1 = np.empty((6, 7)), np.empty((6, 7))
     p, phi, R = np.empty(3), np.empty(3), np.empty((3, 3))
     A, D, P, X, T = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 12)), np.empty((3, 12)), np.empty((5, 3, 3))
@@ -142,8 +165,8 @@ def assemble_rods(
         n0, n1 = elements[e, 0], elements[e, 1]
         b0, b1, h0, h1 = node_body[n0], node_body[n1], node_hinge[n0], node_hinge[n1]
         Rb0, Rb1 = rotations[b0], rotations[b1]
-        node_pose(positions[b0], Rb0, angles[h0] if h0 >= 0 else 0.0, plain[n0], frame[n0], offset[n0], x0, R0, Z0, y0)
-        node_pose(positions[b1], Rb1, angles[h1] if h1 >= 0 else 0.0, plain[n1], frame[n1], offset[n1], x1, R1, Z1, y1)
+        node_pose(positions[b0], Rb0, h0, angles, axes, centres, plain[n0], frame[n0], offset[n0], x0, R0, E0, y0)
+        node_pose(positions[b1], Rb1, h1, angles, axes, centres, plain[n1], frame[n1], offset[n1], x1, R1, E1, y1)
         elastic += element_energy(x0, R0, x1, R1, L[e], gamma[e], K[e], p, phi, R, strain[e])
         if weighted:
             for k in range(3):
@@ -167,9 +190,9 @@ def assemble_rods(
                 G[6 + k] -= 0.5 * L[e] * weight[e, k]
         plain0, plain1 = plain[n0], plain[n1]
         if not plain0:
-            node_map(Rb0, h0 >= 0, frame[n0], Z0, y0, T0)
+            node_map(Rb0, h0, axes, centres, frame[n0], E0, y0, T0, d0)
         if not plain1:
-            node_map(Rb1, h1 >= 0, frame[n1], Z1, y1, T1)
+            node_map(Rb1, h1, axes, centres, frame[n1], E1, y1, T1, d1)
         scatter_gradient(G, 0, plain0, T0, rows[e, :7], gradient)
         scatter_gradient(G, 6, plain1, T1, rows[e, 7:], gradient)
         if order == GRADIENT:
@@ -189,9 +212,9 @@ def assemble_rods(
                 if weighted and k % 6 < 3:
                     G[k] -= 0.5 * L[e] * weight[e, k % 6]
         if not plain0:
-            map_curvature(Rb0, h0 >= 0, frame[n0], Z0, y0, G[:3], G[3:6], H14, 0)
+            map_curvature(Rb0, h0, axes, E0, y0, T0, d0, G[:3], G[3:6], H14, 0)
         if not plain1:
-            map_curvature(Rb1, h1 >= 0, frame[n1], Z1, y1, G[6:9], G[9:12], H14, 7)
+            map_curvature(Rb1, h1, axes, E1, y1, T1, d1, G[6:9], G[9:12], H14, 7)
         s = 0
         for a in range(14):
             for b in range(a, 14):

@@ -11,6 +11,7 @@ from .scene import Chain, Driven, Scene
 from .state import State
 
 _ALL = (0, 1, 2, 3, 4, 5)
+_Z = (0.0, 0.0, 1.0)
 
 
 class SceneBuilder:
@@ -24,7 +25,7 @@ class SceneBuilder:
         self._positions: list[np.ndarray] = []
         self._rotations: list[np.ndarray] = []
         self._n_bodies = 0
-        self._hinges: list[tuple[np.ndarray, ...]] = []  # angle, parameter, factor, prescribed
+        self._hinges: list[tuple[np.ndarray, ...]] = []  # angle, parameter, factor, prescribed, axis, centre
         self._n_hinges = 0
         self._nodes: list[tuple[np.ndarray, ...]] = []  # body, hinge, frame, offset
         self._n_nodes = 0
@@ -47,23 +48,33 @@ class SceneBuilder:
         self._n_bodies += n
         return np.arange(self._n_bodies - n, self._n_bodies)
 
-    def hinges(self, angles: Any, *, parameter: Any = -1, factor: Any = 1.0, prescribed: bool = False) -> np.ndarray:
-        """Add hinges about their body's z axis; returns (n,).
+    def hinges(self, angles: Any, *, parameter: Any = -1, factor: Any = 1.0, prescribed: bool = False,
+               axis: Any = _Z, centre: Any = 0.0) -> np.ndarray:
+        """Add hinges; returns (n,).
 
         angles (n,), rad: initial angles of free hinges; of prescribed ones the constant part of
         angle = constant + factor q[parameter] (parameter -1: constant alone).
+        axis, centre (n, 3) or (3,) : direction and place in axes of the hinge's body, which is that of its nodes
+        Raises InputError for axes without direction.
         """
         angles = np.array(angles, float).reshape(-1)
         n = len(angles)
+        axis = np.array(np.broadcast_to(axis, (n, 3)), float)
+        length = np.linalg.norm(axis, axis=1)
+        if not ((length > 0) & np.isfinite(length)).all():
+            raise InputError("a hinge's axis needs a direction", field="scene.hinges",
+                             value=axis[int(np.argmin(length > 0))].tolist())
         self._hinges.append((angles, np.broadcast_to(parameter, n).astype(int),
-                             np.broadcast_to(factor, n).astype(float), np.full(n, prescribed)))
+                             np.broadcast_to(factor, n).astype(float), np.full(n, prescribed), axis / length[:, None],
+                             np.array(np.broadcast_to(centre, (n, 3)), float)))
         self._n_hinges += n
         return np.arange(self._n_hinges - n, self._n_hinges)
 
     def nodes(self, body: Any, hinge: Any = -1, frame: Any = None, offset: Any = 0.0) -> np.ndarray:
         """Add rod nodes on bodies (n,), behind hinges (n,) (-1: fixed); returns (n,).
 
-        frame (n, 3, 3) : rod axes in the (hinge-turned) body axes, x along the rod; offset (n, 3) likewise.
+        frame (n, 3, 3) : rod axes in body axes at hinge angle 0, x along the rod
+        offset (n, 3) : from the body, or from its hinge's centre, in the same axes
         """
         body = np.array(body, int).reshape(-1)
         n = len(body)
@@ -129,17 +140,18 @@ class SceneBuilder:
         positions, rotations = np.concatenate(self._positions), np.concatenate(self._rotations)
         body, hinge, frame, offset = _columns(self._nodes, 4)
         elements, stiffness, rest, constant, factor, parameter = _columns(self._rods, 6)
-        angles, h_parameter, h_factor, prescribed = _columns(self._hinges, 4) if self._hinges else (
-            np.zeros(0), np.zeros(0, int), np.zeros(0), np.zeros(0, bool))
+        angles, h_parameter, h_factor, prescribed, axis, centre = _columns(self._hinges, 6) if self._hinges else (
+            np.zeros(0), np.zeros(0, int), np.zeros(0), np.zeros(0, bool), np.zeros((0, 3)), np.zeros((0, 3)))
         if (body[elements[:, 0]] == body[elements[:, 1]]).any():
             raise InputError("an element must join two different bodies", field="scene.rods")
         _check_parameters(self.n_parameters, parameter, h_parameter, np.array([d[2] for d in self._driven], int))
         driven, pinned = self._prescriptions(len(positions), angles, h_parameter, h_factor, prescribed)
         weights = np.concatenate(self._weights)
         return Scene(
-            n_parameters=self.n_parameters, initial=State(positions, rotations, angles.copy()), node_body=body,
-            node_hinge=hinge, node_frame=frame, node_offset=offset, elements=elements, stiffness=stiffness,
-            rest_strain=rest, length_constant=constant, length_factor=factor, length_parameter=parameter,
+            n_parameters=self.n_parameters, initial=State(positions, rotations, angles.copy()), hinge_axis=axis,
+            hinge_centre=centre, node_body=body, node_hinge=hinge, node_frame=frame, node_offset=offset,
+            elements=elements, stiffness=stiffness, rest_strain=rest, length_constant=constant,
+            length_factor=factor, length_parameter=parameter,
             weight=weights if weights.any() else None, driven=driven, pinned=pinned,
             actuated=self._actuated, terms=tuple(self._terms), chains=tuple(self._chains),
         )

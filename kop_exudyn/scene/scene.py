@@ -1,8 +1,9 @@
 """A scene: bodies, hinges, rods, loads and actuators, and how they depend on the design parameters q.
 
-Bodies (hubs, corners, plates, free interior nodes) carry a pose. A rod's node sits on one body,
-x = x_b + R_b Z(a) o,  R = R_b Z(a) C,  with Z(a) a turn by the hinge angle a about the body's z axis. So coincident
-joints need no constraint equations: the unknowns are body increments and free hinge angles.
+Bodies (hubs, corners, plates, free interior nodes) carry a pose. A rod's node sits on one body, perhaps behind one of
+its hinges: x = x_b + R_b (p + E(a) o),  R = R_b E(a) C,  with E(a) the turn by the angle a about the hinge's axis
+through its centre p; without a hinge p = 0 and E = I. So coincident joints need no constraint equations: the unknowns
+are body increments and free hinge angles.
 
 Unknowns are numbered 6 body + 0..5 (global translation, then body-frame rotation), then 6 n_bodies + hinge.
 """
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import SimulationFailure
-from ..rods.rotations import rotation_z
+from ..rods.rotations import exp_so3
 from ..rods.sections import Section
 from .state import State
 
@@ -47,7 +48,9 @@ class Scene:
     """What is simulated; made by `SceneBuilder`.
 
     initial : state to start from
-    node_body (N,), node_hinge (N,) (-1: none), node_frame (N, 3, 3), node_offset (N, 3)
+    hinge_axis (n_hinges, 3), hinge_centre (n_hinges, 3) : unit vectors and points, in axes of the hinge's body
+    node_body (N,), node_hinge (N,) (-1: none)
+    node_frame (N, 3, 3), node_offset (N, 3) : C and o, in body axes at hinge angle 0; o from the hinge's centre
     elements (E, 2) nodes; stiffness (E, 6); rest_strain (E, 6)
     length_constant, length_factor (E,), length_parameter (E,) (-1: none): rest length = constant + factor q[parameter]
     weight (E, 3) : dead load per rest length, or None
@@ -60,6 +63,8 @@ class Scene:
 
     n_parameters: int
     initial: State
+    hinge_axis: np.ndarray
+    hinge_centre: np.ndarray
     node_body: np.ndarray
     node_hinge: np.ndarray
     node_frame: np.ndarray
@@ -147,16 +152,26 @@ class Scene:
         positions[bodies // 6, bodies % 6] = values[~hinge]
         return State(positions, state.rotations, angles)
 
-    def node_angles(self, state: State) -> np.ndarray:
-        """Hinge angle (N,) at every node, 0 without a hinge."""
-        return np.where(self.node_hinge >= 0, np.append(state.angles, 0.0)[self.node_hinge], 0.0)
+    def hinge_turns(self, angles: np.ndarray) -> np.ndarray:
+        """E(a) (n_hinges, 3, 3), turns about the hinges' axes."""
+        return exp_so3(angles[:, None] * self.hinge_axis)
+
+    def node_arms(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """From every node's body to the node, y (N, 3), and dy/da (N, 3) in its hinge's angle; in body axes."""
+        arms, rates = self.node_offset.copy(), np.zeros_like(self.node_offset)
+        behind = np.flatnonzero(self.node_hinge >= 0)
+        hinge = self.node_hinge[behind]
+        turned = np.einsum("nij,nj->ni", self.hinge_turns(state.angles)[hinge], self.node_offset[behind])
+        arms[behind] = self.hinge_centre[hinge] + turned
+        rates[behind] = np.cross(self.hinge_axis[hinge], turned)
+        return arms, rates
 
     def node_poses(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Positions (N, 3) and rotations (N, 3, 3) of all nodes."""
-        Rb = state.rotations[self.node_body]
-        turned = Rb @ rotation_z(self.node_angles(state))
-        x = state.positions[self.node_body] + np.einsum("nij,nj->ni", turned, self.node_offset)
-        return x, turned @ self.node_frame
+        Rb, frames = state.rotations[self.node_body], self.node_frame.copy()
+        behind = np.flatnonzero(self.node_hinge >= 0)
+        frames[behind] = self.hinge_turns(state.angles)[self.node_hinge[behind]] @ frames[behind]
+        return state.positions[self.node_body] + np.einsum("nij,nj->ni", Rb, self.node_arms(state)[0]), Rb @ frames
 
     def polylines(self, state: State) -> list[np.ndarray]:
         """Node positions (k, 3) along every rod piece."""

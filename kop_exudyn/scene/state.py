@@ -14,7 +14,7 @@ class State:
 
     positions : (n_bodies, 3) global
     rotations : (n_bodies, 3, 3) body axes as columns
-    angles : (n_hinges,) rad, about the z axis of the hinge's body
+    angles : (n_hinges,) rad
     """
 
     positions: np.ndarray

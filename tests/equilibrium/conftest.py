@@ -29,10 +29,12 @@ def rod_axes(direction: np.ndarray) -> np.ndarray:
     return np.column_stack([x, y, np.cross(x, y)])
 
 
-def make_wheel(weight: bool = True, terms: bool = True, actuated: bool = True, seed: int = 0) -> Case:
+def make_wheel(weight: bool = True, terms: bool = True, actuated: bool = True, oblique: bool = True,
+               seed: int = 0) -> Case:
     """A hub, six rim bodies, spokes and rim of pre-curved rods: a closed structure, all loops stressed.
 
     Parameters: 6 spoke lengths, 6 rim lengths, a driven corner, a driven height.
+    oblique : one free hinge and the driven one stand off their bodies, with axes of their own; others are the body's z
     """
     rng = np.random.default_rng(seed)
     around = np.arange(6) * np.pi / 3
@@ -40,18 +42,22 @@ def make_wheel(weight: bool = True, terms: bool = True, actuated: bool = True, s
     turns = exp_so3(0.3 * rng.normal(size=(7, 3)))
     builder = SceneBuilder(14)
     bodies = builder.bodies(places, turns)
-    free = builder.hinges(0.2 * rng.normal(size=3))
-    driven = builder.hinges([0.05], parameter=12, factor=1.5, prescribed=True)[0]
+    hinge_axes, centres = np.tile([0.0, 0, 1], (5, 1)), np.zeros((5, 3))
+    if oblique:
+        hinge_axes[[0, 3]] = [[0.48, -0.36, 0.8], [-0.36, 0.48, 0.8]]
+        centres[[0, 3]] = [[0.02, 0.01, -0.03], [-0.02, 0.03, 0.01]]
+    angles = np.append(0.2 * rng.normal(size=3), [0.05 + 1.5 * 0.1, -0.3])
+    free = builder.hinges(angles[:3], axis=hinge_axes[:3], centre=centres[:3])
+    driven = builder.hinges([0.05], parameter=12, factor=1.5, prescribed=True, axis=hinge_axes[3], centre=centres[3])[0]
     fixed = builder.hinges([-0.3], prescribed=True)[0]
     hinges = dict(zip(bodies[1:], (*free, driven, fixed)))
-    initial_angle = {**dict(zip(free, builder._hinges[0][0])), driven: 0.05 + 1.5 * 0.1, fixed: -0.3}
     K = rectangle(0.05, 0.02).stiffness(Material(1e7, 0.3))
 
     def rod(first: int, last: int, parameter: int, hinge: int = -1) -> None:
         gap = places[last] - places[first]
         axes = rod_axes(gap)
         offsets = 0.05 * rng.normal(size=(2, 3))
-        turned = turns[first] @ rotation_z(initial_angle[hinge]) if hinge >= 0 else turns[first]
+        turned = turns[first] @ exp_so3(angles[hinge] * hinge_axes[hinge]) if hinge >= 0 else turns[first]
         tail = builder.nodes([first], hinge, turned.T @ axes, offsets[0])[0]
         head = builder.nodes([last], -1, turns[last].T @ axes, offsets[1])[0]
         inner = builder.bodies(places[first] + gap / 2, axes[None])

@@ -27,9 +27,10 @@ def confirmed(scene, q=np.zeros(0), opening=None):
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 @pytest.mark.parametrize("options", [
-    {}, {"weight": False}, {"terms": False}, {"actuated": False}, {"weight": False, "terms": False, "actuated": False}])
+    {}, {"weight": False}, {"terms": False}, {"actuated": False}, {"oblique": False},
+    {"weight": False, "terms": False, "actuated": False}])
 def test_every_feature_is_confirmed(wheel, options, seed):
-    """Offsets, frames, hinges free, driven and constant, driven coordinates, weight, loads, attraction, actuation."""
+    """Offsets, frames, hinges free, driven and constant, straight and oblique, driven coordinates, all loads."""
     case = wheel(seed=seed, **options)
     eq, confirmation = confirmed(case.scene, case.q, case.opening)
     assert np.allclose(confirmation.state.angles, eq.state.angles, atol=1e-7)

@@ -105,7 +105,8 @@ def test_the_state_does_not_depend_on_units_or_placement(wheel):
     initial = replace(scene.initial, positions=m * scene.initial.positions)
     driven = replace(scene.driven, constants=scene.driven.constants * np.where(scene.driven.dofs < 6 * scene.n_bodies, m, 1))
     scaled = replace(
-        scene, initial=initial, node_offset=m * scene.node_offset, length_constant=m * scene.length_constant,
+        scene, initial=initial, node_offset=m * scene.node_offset, hinge_centre=m * scene.hinge_centre,
+        length_constant=m * scene.length_constant,
         stiffness=f * scene.stiffness * np.array([1, 1, 1, m**2, m**2, m**2]), driven=driven,
         rest_strain=scene.rest_strain / np.array([1, 1, 1, m, m, m]), weight=scene.weight * f / m)
     other = solve(System(scaled), case.q * per_q, opening=case.opening, options=NewtonOptions(tolerance=1e-12))

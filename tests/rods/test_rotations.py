@@ -8,7 +8,7 @@ from scipy.special import bernoulli, factorial
 
 from kop_exudyn.rods import element_numpy
 from kop_exudyn.rods.rotations import (
-    bend_coefficient, compose_increments, exp_se3, exp_so3, hat, log_so3, rotation_z,
+    axes_along_z, bend_coefficient, compose_increments, exp_se3, exp_so3, hat, log_so3, rotation_z,
 )
 
 
@@ -81,6 +81,15 @@ def test_composition_stays_orthonormal_after_many_products():
     assert np.abs(R[0].T @ R[0] - np.eye(3)).max() < 1e-15
     turns = 20000 * 0.3
     assert np.allclose(R[0], exp_so3(np.remainder(turns, 2 * np.pi) * w[0] / 0.3), atol=1e-10)
+
+
+def test_axes_along_z_are_a_rotation_onto_the_axis():
+    assert np.array_equal(axes_along_z(np.array([0.0, 0, 1])), np.eye(3))
+    for axis in np.random.default_rng(0).normal(size=(5, 3)):
+        axis /= np.linalg.norm(axis)
+        R = axes_along_z(axis)
+        assert np.allclose(R.T @ R, np.eye(3)) and np.linalg.det(R) == pytest.approx(1)
+        assert np.allclose(R[:, 2], axis)
 
 
 def test_turn_about_z_and_cross_product_matrix():

@@ -27,8 +27,10 @@ def make_case(seed: int) -> Case:
     n_bodies, n_parameters = 8, 6
     builder = SceneBuilder(n_parameters)
     bodies = builder.bodies(rng.normal(size=(n_bodies, 3)), exp_so3(0.4 * rng.normal(size=(n_bodies, 3))))
-    free = builder.hinges(0.5 * rng.normal(size=3))
-    driven = builder.hinges([0.2], parameter=4, factor=-1.5, prescribed=True)
+    free = builder.hinges(0.5 * rng.normal(size=3), axis=[[0, 0, 1], *rng.normal(size=(2, 3))],
+                          centre=[[0, 0, 0], [0, 0, 0], 0.2 * rng.normal(size=3)])
+    driven = builder.hinges([0.2], parameter=4, factor=-1.5, prescribed=True, axis=rng.normal(size=3),
+                            centre=0.2 * rng.normal(size=3))
     fixed = builder.hinges([0.7], prescribed=True)
     hinge_of_body = {0: free[0], 1: free[1], 2: free[2], 3: driven[0], 4: fixed[0]}
 

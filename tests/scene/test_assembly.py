@@ -8,7 +8,9 @@ import pytest
 
 from kop_exudyn.equilibrium.system import System
 from kop_exudyn.rods import element_numpy
+from kop_exudyn.rods.rotations import axes_along_z
 from kop_exudyn.scene.assembly import ENERGY, GRADIENT, HESSIAN
+from kop_exudyn.scene.state import State
 
 SEEDS = [0, 1, 2, 3, 4]
 
@@ -161,3 +163,32 @@ def test_rigid_placement_does_not_matter(case_of):
     (on_bodies, turned), (on_hinges, same) = ([g[:n].reshape(-1, 6) for g in gradients], [g[n:] for g in gradients])
     assert np.allclose(on_bodies[:, :3] @ Q.T, turned[:, :3]) and np.allclose(on_bodies[:, 3:], turned[:, 3:])
     assert np.allclose(on_hinges, same)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_hinges_with_axes_of_their_own_are_those_of_bodies_turned(case_of, seed):
+    """The same scene with every hinged body's axes laid into its hinge, whose axis is then the body's z axis."""
+    case = case_of(seed)
+    scene = case.scene.with_terms()
+    axes, centres = np.tile(np.eye(3), (scene.n_bodies, 1, 1)), np.zeros((scene.n_bodies, 3))
+    for body, hinge in zip(scene.node_body, scene.node_hinge):
+        if hinge >= 0:
+            axes[body], centres[body] = axes_along_z(scene.hinge_axis[hinge]), scene.hinge_centre[hinge]
+    A, p = axes[scene.node_body], np.where(scene.node_hinge[:, None] < 0, centres[scene.node_body], 0.0)
+    laid = replace(
+        scene, hinge_axis=np.tile([0.0, 0, 1], (scene.n_hinges, 1)), hinge_centre=np.zeros((scene.n_hinges, 3)),
+        node_frame=np.swapaxes(A, 1, 2) @ scene.node_frame,
+        node_offset=np.einsum("nji,nj->ni", A, scene.node_offset - p))
+    state = case.state
+    places = state.positions + np.einsum("bij,bj->bi", state.rotations, centres)
+    same = State(places, state.rotations @ axes, state.angles)
+    for first, second in zip(scene.node_poses(state), laid.node_poses(same)):
+        assert np.allclose(first, second, atol=1e-13)
+    systems = System(scene), System(laid)
+    for system, at in zip(systems, (state, same)):
+        system.set_parameters(case.q)
+        assert system.assemble(at).elastic == pytest.approx(systems[0].assemble(state).elastic, rel=1e-12)
+    hinges = systems[0].sparsity.kept[6 * scene.n_bodies:]
+    assert np.allclose(*(system.gradient[hinges[hinges >= 0]] for system in systems), rtol=1e-10)
+    blocks = [kept_hessian(system)[np.ix_(hinges[hinges >= 0], hinges[hinges >= 0])] for system in systems]
+    assert np.allclose(*blocks, atol=1e-10 * np.abs(blocks[0]).max())

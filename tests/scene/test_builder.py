@@ -64,6 +64,21 @@ def test_node_poses():
     assert np.array_equal(scene.plain_nodes, [False, True])
 
 
+def test_hinges_turn_about_their_own_axis_and_centre():
+    builder = SceneBuilder()
+    body = builder.bodies([[1.0, 2, 3]])
+    hinge = builder.hinges([np.pi / 2], axis=[3, 0, 0], centre=[0, 1, 0])
+    node = builder.nodes(body, hinge, offset=[2.0, 5, 0])
+    builder.rod([node[0], builder.nodes(builder.bodies([[0.0, 0, 0]]))[0]], K, length=1.0)
+    scene = builder.build()
+    x, R = scene.node_poses(scene.initial)
+    assert np.allclose(scene.hinge_axis, [[1, 0, 0]])
+    assert np.allclose(x[0], [1 + 2, 2 + 1, 3 + 5])
+    assert np.allclose(R[0], [[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+    arms, rates = scene.node_arms(scene.initial)
+    assert np.allclose(arms[0], [2, 1, 5]) and np.allclose(rates[0], [0, -5, 0]) and not rates[1].any()
+
+
 def test_prescriptions_follow_the_parameters():
     builder = two_rods()
     builder.prescribe(3, 1, parameter=1, factor=2.0, constant=0.5)
@@ -101,6 +116,8 @@ def test_size_and_length_scale_come_from_the_nodes():
     lambda b: b.rod([0, 0], K, length=1.0),  # one body at both ends
     lambda b: b.rod([0, 1], K, parameter=3),
     lambda b: b.hinges([0.0], parameter=7, prescribed=True),
+    lambda b: b.hinges([0.0, 0.0], axis=[[0, 0, 1], [0, 0, 0]]),
+    lambda b: b.hinges([0.0], axis=[0, np.nan, 1]),
     lambda b: b.prescribe(1, 0, parameter=3),
 ])
 def test_pieces_that_do_not_fit(spoil):
