@@ -27,3 +27,6 @@ def test_a_released_mesh_becomes_a_design(tmp_path, shared_data):
     out = tmp_path / "saddle.json"
     assert main(["import", str(shared_data / "umbrella" / "saddle_5t.json.gz"), "--out", str(out)]) == 0
     assert json.loads(out.read_text())["class"] == "umbrella"
+    assert main(["import", str(shared_data / "umbrella" / "saddle_5t.json.gz"), "--out", str(out), "--overwrite",
+                 "--plates", "rigid"]) == 0
+    assert json.loads(out.read_text())["plate_model"] == "rigid"

@@ -92,11 +92,17 @@ def layout_of(scene: Scene) -> Layout:
 
 
 def _merge_coincident(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Scene nodes with the same body, hinge, frame and offset are one Exudyn node."""
+    """Scene nodes with the same body, hinge, frame and offset are one Exudyn node; those without rods are left out.
+
+    Returns one scene node (m,) of each Exudyn node, and the Exudyn node (N,) of every scene node (-1: none).
+    """
+    used = np.unique(scene.elements)
     table = np.concatenate([scene.node_body[:, None], scene.node_hinge[:, None],
                             scene.node_frame.reshape(-1, 9), scene.node_offset], axis=1)
-    _, first, inverse = np.unique(table, axis=0, return_index=True, return_inverse=True)
-    return first, inverse.ravel()
+    _, first, inverse = np.unique(table[used], axis=0, return_index=True, return_inverse=True)
+    node_of = np.full(len(table), -1)
+    node_of[used] = inverse.ravel()
+    return used[first], node_of
 
 
 def _span(element_nodes: np.ndarray, n_nodes: int, scene_node: list[int]) -> tuple[list[np.ndarray], np.ndarray]:

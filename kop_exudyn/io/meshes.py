@@ -17,7 +17,8 @@ class RodMesh:
     """A triangle mesh of rods, every rod piece a closed surface; faces look outwards.
 
     vertices (V, 3) ; faces (F, 3)
-    chains (V,) : the rod piece that each vertex belongs to; elements (V,) : the rod element that is nearest
+    chains (V,) : the rod piece that each vertex belongs to
+    elements (V,) : the rod element that is nearest, -1 on rigid pieces
     """
 
     vertices: np.ndarray
@@ -67,6 +68,8 @@ def _refined(x: np.ndarray, R: np.ndarray, elements: np.ndarray, refinement: int
 
     Between nodes the pose moves at constant strain, which is the element's own interpolation.
     """
+    if not len(elements):
+        return x, R, np.full(len(x), -1)
     if refinement == 1:
         return x, R, np.append(elements, elements[-1])
     share = np.arange(refinement) / refinement

@@ -46,8 +46,7 @@ class PlacedPieces:
     def chains(self) -> dict[int, list[int]]:
         """parameter -> rod pieces whose length it is."""
         found = defaultdict(list)
-        for number, chain in enumerate(self.scene.chains):
-            parameter = int(self.scene.length_parameter[chain.elements[0]])
+        for number, parameter in enumerate(self.scene.chain_parameters.tolist()):
             if parameter >= 0:
                 found[parameter].append(number)
         return dict(found)
@@ -100,8 +99,7 @@ class PlacedPieces:
     @cached_property
     def chain_pieces(self) -> list[Piece | None]:
         """The piece that each rod piece belongs to; None for rods that no part makes."""
-        parameters = [int(self.scene.length_parameter[chain.elements[0]]) for chain in self.scene.chains]
-        return [self.pieces.by_parameter.get(parameter) for parameter in parameters]
+        return [self.pieces.by_parameter.get(parameter) for parameter in self.scene.chain_parameters.tolist()]
 
     def joints_of(self, piece: Piece) -> list[int]:
         """Numbers of the joints that a piece's rods end at."""

@@ -185,10 +185,10 @@ def _ring_nodes(scene: Scene) -> np.ndarray:
 
 
 def _ring_values(scene: Scene, values: np.ndarray) -> np.ndarray:
-    """(M,) at every ring the larger value (E,) of the elements beside it."""
+    """(M,) at every ring the larger value (E,) of the elements beside it, NaN on rigid pieces."""
     found: Iterable[np.ndarray] = (
         np.fmax(np.append(values[chain.elements], np.nan), np.insert(values[chain.elements], 0, np.nan))
-        for chain in scene.chains)
+        if len(chain.elements) else np.full(len(chain.nodes), np.nan) for chain in scene.chains)
     return np.concatenate(list(found))
 
 

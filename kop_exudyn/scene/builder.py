@@ -117,6 +117,10 @@ class SceneBuilder:
         self._chains.append(Chain(nodes, elements, section))
         return elements
 
+    def rigid(self, nodes: Sequence[int], section: Section | None = None) -> None:
+        """Add a piece that doesn't bend, between nodes of one body: drawn and exported, but without elements."""
+        self._chains.append(Chain(np.asarray(nodes, int), np.zeros(0, int), section))
+
     def prescribe(self, body: int, axis: int, parameter: int, factor: float = 1.0, constant: float = 0.0) -> None:
         """Let a parameter drive a body's coordinate (axis 0..2): coordinate = constant + factor q[parameter]."""
         self._driven.append((int(body), int(axis), int(parameter), float(factor), float(constant)))

@@ -36,7 +36,7 @@ class Driven:
 
 @dataclass(frozen=True)
 class Chain:
-    """One rod piece as it is drawn and exported: its nodes in order, its elements, its cross-section."""
+    """One rod piece as it is drawn and exported: its nodes in order, its elements (none: rigid), its cross-section."""
 
     nodes: np.ndarray
     elements: np.ndarray
@@ -106,6 +106,12 @@ class Scene:
     def with_pins(self, pinned: np.ndarray) -> Scene:
         """The same scene with these unknowns (n_dofs,) bool held instead."""
         return replace(self, pinned=np.asarray(pinned, bool))
+
+    @cached_property
+    def chain_parameters(self) -> np.ndarray:
+        """(n_chains,) the parameter that each rod piece's length depends on, -1 without one."""
+        return np.array([self.length_parameter[chain.elements[0]] if len(chain.elements) else -1
+                         for chain in self.chains], int)
 
     @cached_property
     def plain_nodes(self) -> np.ndarray:

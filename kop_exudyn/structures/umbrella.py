@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import InputError, SimulationFailure
 from ..rods.sections import Material, material_from_dict
 from .base import Design, ElementGroup, Role, Target, register
+from .umbrella_bodies import RODS, joint_bodies
 from .umbrella_layout import BaseMesh, Plates, umbrella_mesh
 from .umbrella_mesh import UmbrellaMesh, UmbrellaTarget
 from .umbrella_release import release_mesh
@@ -52,6 +53,7 @@ class Umbrella(Design):
     mesh : geometry in the compact state
     arms, plates : materials
     arm_elements, plate_elements : rod elements in an arm and in a plate rod
+    plate_model : "rods", or "rigid": plates as bodies that don't bend, with fewer unknowns
     least_length : lower bound of arm lengths, default 32/30 of the plate edge
     deployment : how it is opened
     """
@@ -61,16 +63,17 @@ class Umbrella(Design):
 
     def __init__(self, name: str, mesh: UmbrellaMesh, *, arms: Material = Material(1400.0, 0.35),
                  plates: Material = Material(14000.0, 0.35), arm_elements: int = 3, plate_elements: int = 1,
-                 least_length: float | None = None, deployment: Deployment = Deployment()):
+                 plate_model: str = RODS, least_length: float | None = None, deployment: Deployment = Deployment()):
         self.name, self.mesh, self.deployment = name, mesh, deployment
         self.arms, self.plates = arms, plates
-        self.arm_elements, self.plate_elements = arm_elements, plate_elements
+        self.arm_elements, self.plate_elements, self.plate_model = arm_elements, plate_elements, plate_model
+        self._bodies = joint_bodies(mesh, plate_model)
         self.parameters = mesh.lengths.ravel()
         least = _LEAST_LENGTH * mesh.plate_edge if least_length is None else least_length
         self.lower = np.minimum(least, self.parameters)
         self.upper = np.full(len(self.parameters), np.inf)
         self.groups = [ElementGroup("cell", np.arange(2 * mesh.n_cells).reshape(-1, 2))]
-        self.joints = mesh.crossings
+        self.joints = self._bodies.body[mesh.crossings]
 
     @classmethod
     def from_release(cls, data: Mapping[str, Any], source: str = "umbrella mesh", **options: Any) -> Umbrella:
@@ -81,7 +84,8 @@ class Umbrella(Design):
     def _model(self):
         from .umbrella_scene import UmbrellaModel, umbrella_scene
 
-        return umbrella_scene(self.mesh, UmbrellaModel(self.arm_elements, self.plate_elements, self.arms, self.plates))
+        return umbrella_scene(self.mesh, UmbrellaModel(self.arm_elements, self.plate_elements, self.arms, self.plates,
+                                                       self.plate_model))
 
     def scene(self, role: str = "deployed") -> Scene:
         """The final state's scene: actuators of weight 1, no attraction, the central X joint pinned."""
@@ -137,7 +141,7 @@ class Umbrella(Design):
         weight = self.deployment.attraction * self.deployment.share / (3 * n)
         weight *= self._model.energy_scale / self.mesh.size**2
         return (Attraction(self.joints[known], targets=target.crossings[known], target_weight=weight),
-                Attraction(self.mesh.centres, targets=target.plates, target_weight=weight))
+                Attraction(self._bodies.body[self.mesh.centres], targets=target.plates, target_weight=weight))
 
     @cached_property
     def deployed(self) -> Equilibrium:
@@ -160,18 +164,18 @@ class Umbrella(Design):
         """Triangles between each cell's midpoint and its X joints, in pairs."""
         mesh = self.mesh
         place = np.full(len(mesh.positions), -1)
-        place[self.joints] = np.arange(len(self.joints))
+        place[mesh.crossings] = np.arange(len(mesh.crossings))
         arms = mesh.rods.arms
         at = place[mesh.rods.joints[arms]].max(axis=1)
         touching = np.unique(np.stack([mesh.rods.cells[arms], at], axis=1), axis=0)
         faces = [(len(self.joints) + a[0], a[1], b[1]) for k, a in enumerate(touching)
                  for b in touching[k + 1:] if a[0] == b[0]]
-        middles = state.positions[mesh.centres].mean(axis=1)
+        middles = state.positions[self._bodies.body[mesh.centres]].mean(axis=1)
         return np.concatenate([state.positions[self.joints], middles]), np.array(faces, int)
 
     def report_positions(self, state: State) -> np.ndarray:
         """Positions of all joints, plates' included, in the order and the units of the design's own file."""
-        return state.positions[: len(self.mesh.positions)]
+        return self._bodies.positions(state)
 
     def spacings(self, state: State) -> np.ndarray:
         """Distance (n_cells,) of the two plates of every cell."""
@@ -181,9 +185,17 @@ class Umbrella(Design):
         """The same design with other arm lengths (n_cells, 2) as its input."""
         lengths = np.array(lengths, float).reshape(-1, 2)
         positions = self.mesh.compact_positions(lengths.ravel())
-        return Umbrella(self.name, replace(self.mesh, lengths=lengths, positions=positions), arms=self.arms,
-                        plates=self.plates, arm_elements=self.arm_elements, plate_elements=self.plate_elements,
-                        least_length=float(self.lower.min()), deployment=self.deployment)
+        return self._like(replace(self.mesh, lengths=lengths, positions=positions))
+
+    def with_plates(self, plate_model: str) -> Umbrella:
+        """The same design with its plates modelled as "rods" or "rigid"."""
+        return self._like(self.mesh, plate_model=plate_model)
+
+    def _like(self, mesh: UmbrellaMesh, **changes: Any) -> Umbrella:
+        options = {"arms": self.arms, "plates": self.plates, "arm_elements": self.arm_elements,
+                   "plate_elements": self.plate_elements, "plate_model": self.plate_model,
+                   "least_length": float(self.lower.min()), "deployment": self.deployment}
+        return Umbrella(self.name, mesh, **(options | changes))
 
 
 @register("umbrella")
@@ -196,7 +208,7 @@ def umbrella_from_dict(data: Mapping[str, Any], source: str = "design") -> Umbre
         target = _target(data["target"], base) if "target" in data else None
         return Umbrella(data["name"], umbrella_mesh(base, data["lengths"], plates, target), **materials,
                         arm_elements=_count(data, "arm_elements", 3), plate_elements=_count(data, "plate_elements", 1),
-                        least_length=data.get("least_length"))
+                        plate_model=data.get("plate_model", RODS), least_length=data.get("least_length"))
     except KeyError as error:
         raise InputError("a field is missing", source=source, field=str(error).strip("'")) from None
     except (TypeError, AttributeError) as error:

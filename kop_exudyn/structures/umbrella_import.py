@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import InputError
 from .umbrella import umbrella_from_dict
+from .umbrella_bodies import RODS
 from .umbrella_mesh import UmbrellaMesh
 from .umbrella_release import release_mesh
 
@@ -15,11 +16,14 @@ _TOLERANCE = 1e-5  # of the compact mesh's size
 _DIGITS = 9
 
 
-def import_release(data: Mapping[str, Any], name: str, source: str = "umbrella mesh") -> dict[str, Any]:
+def import_release(data: Mapping[str, Any], name: str, source: str = "umbrella mesh",
+                   plate_model: str = RODS) -> dict[str, Any]:
     """The content of a design file that describes the same umbrella mesh as a released file's content.
 
     The released file lists all joints and rods; a design file has the base mesh and the arm lengths, from which they
     follow. Raises InputError when they don't (as for meshes with further arms along the boundary).
+
+    plate_model : "rods" as released, or "rigid"
     """
     released = release_mesh(data, source)
     unit = released.unit
@@ -34,6 +38,8 @@ def import_release(data: Mapping[str, Any], name: str, source: str = "umbrella m
                    "width": round(unit * released.width, _DIGITS), "spacing": round(unit * released.spacing, _DIGITS)},
         "materials": {"arms": {"young": 1400.0, "poisson": 0.35}, "plates": {"young": 14000.0, "poisson": 0.35}},
     }
+    if plate_model != RODS:
+        own["plate_model"] = plate_model
     order = _same_crossings(released, umbrella_from_dict(own, source).mesh, source)
     if released.target is not None and np.isfinite(released.target.crossings).all():
         target = released.target

@@ -12,6 +12,11 @@ from kop_exudyn.equilibrium.sensitivities import Sensitivities
 from kop_exudyn.equilibrium.system import System
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.documents import check_schema
+from kop_exudyn.io.meshes import sweep
+from kop_exudyn.io.pieces import DesignPieces
+from kop_exudyn.io.placement import PlacedPieces
+from kop_exudyn.optimize.fitting import best_placement
+from kop_exudyn.report.viewer_scenes import design_scene
 from kop_exudyn.structures.base import design_from_dict
 from kop_exudyn.structures.umbrella import Umbrella
 from kop_exudyn.structures.umbrella_layout import BaseMesh, Plates, umbrella_mesh
@@ -33,9 +38,9 @@ def hexagon() -> dict:
     }
 
 
-@pytest.fixture(scope="module")
-def design() -> Umbrella:
-    return design_from_dict(hexagon())
+@pytest.fixture(scope="module", params=["rods", "rigid"])
+def design(request) -> Umbrella:
+    return design_from_dict(hexagon() | {"plate_model": request.param})
 
 
 @pytest.fixture(scope="module")
@@ -77,12 +82,48 @@ def test_deployed_state_is_stable_and_opens_every_cell(design, deployed):
     assert design.report_positions(deployed.state).shape == design.mesh.positions.shape
 
 
-def test_plates_of_rods_are_nearly_rigid_bodies(design, deployed):
-    rods, x = design.mesh.rods, deployed.state.positions
+def test_plates_are_rigid_bodies_or_nearly_so(design, deployed):
+    rods, x = design.mesh.rods, design.report_positions(deployed.state)
     first = rods.joints[~rods.arms]
     before = np.linalg.norm(np.diff(design.mesh.positions[first], axis=1), axis=2)
     after = np.linalg.norm(np.diff(x[first], axis=1), axis=2)
-    assert np.abs(after / before - 1).max() < 1e-2
+    assert np.abs(after / before - 1).max() < (1e-2 if design.plate_model == "rods" else 1e-12)
+
+
+def test_rigid_plates_are_the_limit_of_stiff_ones():
+    """The distance of the joints from those between rigid plates falls as one over the plates' modulus."""
+    rigid = design_from_dict(hexagon() | {"plate_model": "rigid"})
+    eq = rigid.deploy()["deployed"]
+    wanted, apart, less = rigid.report_positions(eq.state), [], []
+    for stiffer in (100, 1000):
+        data = hexagon()
+        data["materials"]["plates"]["young"] *= stiffer
+        design = design_from_dict(data)
+        found = design.deploy()["deployed"]
+        x = design.report_positions(found.state)
+        apart.append(np.abs(best_placement(x, wanted, np.full(len(x), 1 / len(x))).apply(x) - wanted).max())
+        less.append(eq.elastic_energy - found.elastic_energy)
+    assert apart[1] < 1e-4 and apart[0] / apart[1] == pytest.approx(10, rel=0.1)
+    assert less[0] / less[1] == pytest.approx(10, rel=0.1)
+
+
+def test_rigid_plates_have_six_unknowns(design):
+    mesh = design.mesh
+    plates, arms, crossings = mesh.centres.size, np.count_nonzero(mesh.rods.arms), len(mesh.crossings)
+    inner = 2 * arms  # bodies inside arms of three elements
+    joints = plates + arms + crossings if design.plate_model == "rods" else plates + crossings
+    assert design.systems["deployed"].n_unknowns == 6 * (joints + inner) - 6 + np.count_nonzero(mesh.hinged)
+
+
+def test_rigid_plates_are_drawn(design, deployed):
+    solid = sweep(design.scene(), deployed.state)
+    assert len(solid.faces) > 0 and (np.count_nonzero(solid.elements < 0) > 0) == (design.plate_model == "rigid")
+    pieces = PlacedPieces(DesignPieces(design, ()), design.scene())
+    assert len(pieces.chain_pieces) == len(design.mesh.rods.joints) == len(design.scene().chains)
+    rows = {len(chains) for chains in pieces.chains.values()}
+    assert rows == {2} and len(pieces.chains) == 12
+    page = design_scene(design, {"deployed": deployed})
+    assert np.isfinite(page.designs[0].states[0].positions).all()
 
 
 def test_exudyn_confirms_the_final_state(design, deployed):
@@ -118,7 +159,7 @@ def test_swapping_top_and_bottom_turns_the_structure_upside_down(design, deploye
 
 @pytest.mark.parametrize("unit", [0.001, 25.4])
 def test_the_deployed_shape_does_not_depend_on_the_unit_of_length(deployed, design, unit):
-    data = hexagon()
+    data = hexagon() | {"plate_model": design.plate_model}
     data["base"]["vertices"] = (unit * np.array(data["base"]["vertices"])).tolist()
     data["lengths"] = (unit * np.array(data["lengths"])).tolist()
     data["plates"] = {key: unit * value for key, value in data["plates"].items()}
@@ -128,7 +169,7 @@ def test_the_deployed_shape_does_not_depend_on_the_unit_of_length(deployed, desi
 
 
 def test_file_meets_its_schema():
-    check_schema(hexagon(), "umbrella")
+    check_schema(hexagon() | {"plate_model": "rigid"}, "umbrella")
 
 
 @pytest.mark.parametrize("path, value, field", [
@@ -141,6 +182,7 @@ def test_file_meets_its_schema():
     (("plates", "arm_position"), 40.0, "plates.arm_position"),
     (("materials", "arms", "young"), -1.0, "young"),
     (("arm_elements",), 0, "arm_elements"),
+    (("plate_model",), "soft", "plate_model"),
     (("target",), {"vertices": [[0, 0, 0]], "faces": [[0, 0, 0]], "crossings": [[0, 0, 0]],
                    "plates": [[0, 0, 0]] * 6}, "target.crossings"),
 ])

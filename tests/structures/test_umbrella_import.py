@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from kop_exudyn.io.documents import check_schema
 from kop_exudyn.io.json_files import read_json
 from kop_exudyn.structures.base import design_from_dict
 from kop_exudyn.structures.umbrella import Umbrella
+from kop_exudyn.structures.umbrella_bodies import joint_bodies
 from kop_exudyn.structures.umbrella_import import import_release
 
 
@@ -31,6 +33,20 @@ def test_imported_design_is_the_same_structure_in_millimetres(content):
     assert a.elastic_energy == pytest.approx(unit**3 * b.elastic_energy, rel=1e-6)
     distances = [np.sort(pdist(eq.state.positions[d.joints])) for eq, d in ((a, own), (b, released))]
     assert distances[0] == pytest.approx(unit * distances[1], rel=1e-4)
+
+
+def test_imported_plates_may_be_rigid(content):
+    data = import_release(content, "cap", plate_model="rigid")
+    check_schema(data, "umbrella")
+    assert design_from_dict(data).plate_model == "rigid" and "plate_model" not in import_release(content, "cap")
+
+
+def test_rigid_plates_lie_on_side_a_of_their_joints(content):
+    mesh = Umbrella.from_release(content).mesh
+    behind = mesh.rods.behind.copy()
+    behind[~mesh.rods.arms, 0] = True
+    with pytest.raises(InputError, match="side A"):
+        joint_bodies(replace(mesh, rods=replace(mesh.rods, behind=behind)), "rigid")
 
 
 def test_a_mesh_with_other_arms_is_refused(content):

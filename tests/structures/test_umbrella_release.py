@@ -52,6 +52,19 @@ def test_final_states_agree_with_the_reference_simulator(content, name):
     assert design.spacings(state.state) == pytest.approx(np.array(reference["plate_spacing"]), rel=1e-3)
 
 
+def test_rigid_plates_are_cheaper_and_nearly_the_same(content):
+    rods = Umbrella.from_release(content("hemisphere_5t"), "hemisphere_5t")
+    rigid = rods.with_plates("rigid")
+    states = [design.deploy()["deployed"] for design in (rods, rigid)]
+    joints = [design.report_positions(eq.state) for design, eq in zip((rods, rigid), states)]
+    assert percent_apart(*joints).max() < 0.1
+    assert states[1].elastic_energy == pytest.approx(states[0].elastic_energy, rel=0.03)
+    unknowns = [design.systems["deployed"].n_unknowns for design in (rods, rigid)]
+    assert unknowns[1] < 0.75 * unknowns[0]
+    confirmation = ExudynModel(rigid.scene()).confirm(states[1])
+    assert confirmation.moved < 1e-8 and confirmation.newton_steps <= 2
+
+
 def test_lilium_deploys_ends_stable_and_is_confirmed_by_exudyn(content):
     """Of all models it has the softest mode, so round-off moves it most."""
     design = Umbrella.from_release(content("lilium"), "lilium")
