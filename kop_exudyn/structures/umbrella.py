@@ -187,9 +187,10 @@ class Umbrella(Design):
         positions = self.mesh.compact_positions(lengths.ravel())
         return self._like(replace(self.mesh, lengths=lengths, positions=positions))
 
-    def with_plates(self, plate_model: str) -> Umbrella:
-        """The same design with its plates modelled as "rods" or "rigid"."""
-        return self._like(self.mesh, plate_model=plate_model)
+    def with_plates(self, plate_model: str, young: float | None = None) -> Umbrella:
+        """The same design with its plates modelled as "rods", perhaps of another modulus, or "rigid"."""
+        plates = self.plates if young is None else replace(self.plates, young=young)
+        return self._like(self.mesh, plate_model=plate_model, plates=plates)
 
     def _like(self, mesh: UmbrellaMesh, **changes: Any) -> Umbrella:
         options = {"arms": self.arms, "plates": self.plates, "arm_elements": self.arm_elements,
