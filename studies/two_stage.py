@@ -33,7 +33,7 @@ designs = load_designs(MODELS, number)
 
 # 2. How many parts of each kind, and how long to optimise.
 parts = {"linear": 6, "angular": 3} if arguments.quick else {"linear": 12, "angular": 5}
-stages = StageSettings(relaxed_steps=2, assigned_steps=2, path_steps=4, rescues=0) if arguments.quick else StageSettings()
+stages = StageSettings(relaxed_steps=2, assigned_steps=2, reassignments=0, path_steps=4) if arguments.quick else StageSettings()
 
 # 3. All stages; results, figures and index.html go to the folder.
 result = optimize_kit(designs, parts, out=arguments.out, settings=JobSettings(stages=stages, jobs=arguments.jobs),

@@ -1,7 +1,7 @@
 """Linear constraints lower <= A x <= upper and bounds: checked, read from cvxpy expressions, shown infeasible."""
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,6 +60,40 @@ class LinearConstraints:
             return 0.0
         value = self.A @ x
         return float(max(0.0, np.max(self.lower - value), np.max(value - self.upper)))
+
+    def through(self, matrix: sp.csr_matrix) -> LinearConstraints:
+        """The same constraints on p, where x = M p for a matrix M (n, k)."""
+        return LinearConstraints(sp.csr_matrix(self.A @ matrix), self.lower, self.upper, self.names)
+
+    def among(self, kept: np.ndarray) -> LinearConstraints:
+        """The constraints that concern no other variables than those at the positions `kept` (k,), on these alone."""
+        outside = np.ones(self.A.shape[1], dtype=bool)
+        outside[kept] = False
+        rows = np.flatnonzero(abs(self.A) @ outside == 0)
+        return LinearConstraints(self.A[rows][:, kept], self.lower[rows], self.upper[rows],
+                                 tuple(self.names[row] for row in rows))
+
+
+def on_elements(designs: Sequence[Any], statement: Callable[[Mapping[str, Any]], Sequence[Any]]) -> LinearConstraints:
+    """Constraints on the elements of several designs, stated in cvxpy.
+
+    designs : in the order of the run; anything with a `name` and `parameters` (nq,)
+    statement : called with design name -> cvxpy expression (nq,) of its parameters (which of them are the elements of
+        a kind, `design.groups` tells); returns affine equations and inequalities, which may couple designs
+
+    Raises InputError, naming the constraint, for what isn't linear, and where no parameters can meet all of them.
+
+        on_elements(designs, lambda q: [cp.sum(q["vault"][:12]) == 3.0, q["vault"][0] == q["dome"][0]])
+    """
+    import cvxpy as cp
+
+    offsets = np.cumsum([0, *(len(design.parameters) for design in designs)])
+    variable = cp.Variable(int(offsets[-1]), name="q")
+    parts = {design.name: variable[a:b] for design, a, b in zip(designs, offsets, offsets[1:])}
+    found = from_cvxpy(statement(parts), variable)
+    free = np.full(variable.size, np.inf)
+    check_feasible(-free, free, found)
+    return found
 
 
 def validate_bounds(lower: Any, upper: Any, n: int, field: str = "bounds") -> tuple[np.ndarray, np.ndarray]:

@@ -9,6 +9,7 @@ from ..structures.base import Design
 from .dataset import Dataset
 from .objective import Reference, Weights
 from .pool import DesignPool
+from .rounds import in_rounds
 from .stages import Observer, StageResult, Stages, StageSettings, Store
 
 
@@ -70,7 +71,6 @@ def run_job(
         announce("path to the parts")
         found["relaxed"], at_parts = stages.to_parts(relaxed, fixed_kit=kit is not None)
         announce("assigned stage")
-        found["assigned"] = at_parts if kit is not None else stages.assigned(at_parts)
-        found["assigned"].jumps = at_parts.jumps
+        found["assigned"] = in_rounds(stages, at_parts, fixed_kit=kit is not None)
         outcome.equilibria, outcome.newton_iterations = dataset.tally.equilibria, dataset.tally.newton_iterations
     return outcome

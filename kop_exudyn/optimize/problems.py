@@ -38,6 +38,7 @@ class DatasetPoint:
 class RelaxedProblem:
     """J(q) = sum F(q) + P(q) over the parameters q of all elements; the kit follows q.
 
+    constraints : on q, besides its bounds
     fixed_kit : keep the kit (projection onto an existing one), only the assignment follows
     """
 
@@ -80,16 +81,21 @@ class RelaxedProblem:
 
 
 class AssignedProblem:
-    """J(p) = sum F(M p) over the parts p, every element being its part; the assignment is fixed."""
+    """J(p) = sum F(M p) over the parts p, every element being its part; the assignment is fixed.
+
+    constraints : on the elements q = M p, as in `RelaxedProblem`
+    """
 
     def __init__(self, dataset: Dataset, kit: Kit, assignment: Assignment, bounds: Bounds | None = None,
                  constraints: LinearConstraints | None = None):
         self.dataset, self.kit, self.assignment = dataset, kit, assignment
+        self.part_bounds, self.of_elements = bounds, constraints
         self.matrix = sp.csr_matrix(assignment.matrix(kit))
         self.lower, self.upper = kit.bounds(bounds)
         self._limit_by_designs()
         self.n = len(self.lower)
-        self.constraints = constraints if constraints is not None else LinearConstraints.none(self.n)
+        self.constraints = (constraints.through(self.matrix) if constraints is not None
+                            else LinearConstraints.none(self.n))
         self.scale = self._scale()
 
     def evaluate(self, x: np.ndarray, previous: Point | None) -> Point:

@@ -13,6 +13,7 @@ from ..kit.cluster import cluster
 from ..kit.kinds import Bounds
 from ..kit.parts import Assignment, Kit
 from ..kit.projection import Projection
+from .constraints import LinearConstraints, check_feasible
 from .dataset import Dataset, evaluations_from_arrays, evaluations_to_arrays
 from .history import SQPState, StepRecord
 from .objective import Evaluation
@@ -52,14 +53,19 @@ class StageSettings:
     schedule : values of w_c, one after the other; default: 0.1, 1, 10 and 100 times the weight of the fit, so that
         the balance of fit and projection is the same whatever the weights
     tight : largest rms distance of elements to their parts, relative to the kind's scale, at which raising w_c ends
-    relaxed_steps, assigned_steps : accepted SQP steps at most, for each w_c and for the assigned stage
+    relaxed_steps, assigned_steps, round_steps : accepted SQP steps at most: for each w_c, for an assigned stage (or
+        baseline) without reassignments, for each round of one with them
     relaxed_tolerance, last_tolerance, assigned_tolerance : the rounds of the relaxed stage before the last, the last
         one, and the assigned stage end when steps promise or gain less than this share of J
+    reassignments : rounds of the assigned stage in which elements get other parts (see reassign.py), at most; a round
+        that gains less than `reassigned_tolerance` of J is the last
     path_steps : steps of the watched path between the stages
-    rescues : how often w_c is raised by ten when a design snaps on that path
+    rescues : how often w_c is raised by ten when a design fails on that path, or snaps and there are no reassignments
     growth : how many parts a kind may then get more, when raising w_c didn't help
     restarts, seed : of the clustering
     bounds : kind -> (lower, upper) of the parts, besides the natural ones
+    constraints : on the elements of all designs, see `on_elements`; the baselines "direct" and "unrelaxed" keep to them
+        as far as their parts can
     hessian : "exact" or "bfgs"
     """
 
@@ -67,26 +73,44 @@ class StageSettings:
     tight: float = 1e-3
     relaxed_steps: int = 25
     assigned_steps: int = 40
+    round_steps: int = 15
     relaxed_tolerance: float = 3e-3
     last_tolerance: float = 5e-4
     assigned_tolerance: float = 1e-4
+    reassignments: int = 5
+    reassigned_tolerance: float = 1e-2
     path_steps: int = 10
     rescues: int = 2
     growth: int = 0
     restarts: int = 20
     seed: int = 0
     bounds: Bounds | None = None
+    constraints: LinearConstraints | None = None
     hessian: str = "exact"
 
 
 @dataclass(frozen=True)
 class StageEvent:
-    """One accepted step, as observers see it: the stage's name, the record, the objective's terms, w_c (or None)."""
+    """One accepted step, as observers see it: the SQP's name, the record, the objective's terms, w_c (or None).
 
-    stage: str
+    The SQP of round 2 of the assigned stage is "assigned-2".
+    """
+
+    sqp: str
     record: StepRecord
     terms: Mapping[str, float]
     weight: float | None
+
+    @property
+    def stage(self) -> str:
+        """ "relaxed" with all its w_c and rescues, "assigned" with all its rounds, or "unrelaxed"."""
+        return "relaxed" if self.weight is not None else self.sqp.partition("-")[0]
+
+    @property
+    def round(self) -> int | None:
+        """The round of the assigned stage, from 1; None elsewhere."""
+        number = self.sqp.partition("-")[2]
+        return int(number) if self.stage == "assigned" and number else None
 
 
 @dataclass(frozen=True)
@@ -140,8 +164,7 @@ class Stages:
             kit = clustering.kit
         nearest = self.projection.minimise(self.q0, kit, fixed_kit=True)
         assignment = clustering.assignment if clustering is not None else nearest.assignment
-        designs, jumps = self._to_parts(self.inputs(), kit, assignment)
-        return self._result(designs, kit, assignment, jumps=jumps)
+        return self.confirmed(self.built_from(kit, assignment, self.inputs()))
 
     def inputs(self) -> list[Evaluation]:
         """The input designs, judged by the objective."""
@@ -163,28 +186,58 @@ class Stages:
         data = result.point.data
         return StageResult(list(evaluations), kit, data.assignment, steps, result.point.value, result.status)
 
-    def assigned(self, start: StageResult, name: str = "assigned") -> StageResult:
-        """Minimise over the parts from a state in which every element is its part; designs that failed stay out."""
+    def assigned(self, start: StageResult, name: str = "assigned", max_steps: int | None = None) -> StageResult:
+        """Minimise over the parts from a state in which every element is its part; designs that failed stay out.
+
+        max_steps : default: the settings' `assigned_steps`
+        """
         members = [n for n, e in enumerate(start.designs) if isinstance(e, Evaluation)]
         if not members:
             return replace(start, status="no design could be built from the kit", jumps=[])
-        dataset = self.dataset.subset(members)
-        assignment = restrict(start.assignment, self.dataset, members)
-        problem = AssignedProblem(dataset, start.kit, assignment, self.settings.bounds)
+        problem = self.assigned_problem(start, members)
+        try:
+            check_feasible(problem.lower, problem.upper, problem.constraints)
+        except InputError as error:
+            log.warning("%s: the elements' constraints can't be met by these parts: %s", name, error)
+            return replace(start, status="the constraints can't be met by these parts", jumps=[])
         point = problem.point(start.kit.vector.copy(), [start.designs[n] for n in members])
-        options = SQPOptions(hessian=self.settings.hessian, secant=True, max_steps=self.settings.assigned_steps,
+        options = SQPOptions(hessian=self.settings.hessian, secant=True, max_steps=max_steps or self.settings.assigned_steps,
                              decrease_tolerance=self.settings.assigned_tolerance)
         result = self._sqp(name, problem, point, options, None)
         designs = list(start.designs)
         for n, evaluation in zip(members, result.point.data.evaluations):
             designs[n] = evaluation
-        return self._result(designs, result.point.data.kit, start.assignment, result.steps, result.status)
+        return self.confirmed(self._result(designs, result.point.data.kit, start.assignment, result.steps,
+                                           result.status))
+
+    def assigned_problem(self, start: StageResult, members: Sequence[int]) -> AssignedProblem:
+        """The problem over the parts, for some of the designs."""
+        constraints = self.settings.constraints
+        if constraints is not None and len(members) < len(self.dataset.designs):
+            offsets = self.dataset.offsets
+            constraints = constraints.among(np.concatenate([np.arange(offsets[n], offsets[n + 1]) for n in members]))
+        return AssignedProblem(self.dataset.subset(members), start.kit,
+                               restrict(start.assignment, self.dataset, members), self.settings.bounds, constraints)
+
+    def built_from(self, kit: Kit, assignment: Assignment, start: Sequence[Evaluation]) -> StageResult:
+        """All designs followed from evaluations to the parts of another kit or assignment; not confirmed yet."""
+        designs, jumps = self._to_parts(start, kit, assignment)
+        return self._result(designs, kit, assignment, jumps=jumps)
+
+    def confirmed(self, result: StageResult) -> StageResult:
+        """The same result at Exudyn's own solutions; a design that Exudyn doesn't confirm becomes a failure."""
+        found = {n: d for n, d in enumerate(result.designs) if isinstance(d, Evaluation)}
+        designs = list(result.designs)
+        for n, evaluation in self.dataset.confirm(found).items():
+            designs[n] = evaluation
+        return replace(result, designs=designs, value=self._value(designs))
 
     def to_parts(self, relaxed: StageResult, fixed_kit: bool = False) -> tuple[StageResult, StageResult]:
         """Follow the straight path from the relaxed elements to their parts, watching for snaps.
 
-        When a design snaps or fails, w_c is raised and the relaxed stage goes on from where it was. Returns the
-        relaxed result that the path started from in the end, and the state at the parts.
+        When a design fails, w_c is raised and the relaxed stage goes on from where it was; also when one snaps, unless
+        the rounds of the assigned stage are to make up for that. Returns the relaxed result that the path started from
+        in the end, and the state at the parts.
         """
         settings = self.settings
         weight = settings.schedule[-1]
@@ -196,7 +249,8 @@ class Stages:
                             100 * jump.fraction, 100 * jump.distance)
             for failure in failed:
                 log.warning("%s", failure)
-            if not jumps and not failed or rescue == settings.rescues:
+            needed = failed or jumps and not settings.reassignments
+            if not needed or rescue == settings.rescues:
                 break
             weight *= 10
             log.warning("raising w_c to %g", weight)
@@ -206,14 +260,14 @@ class Stages:
             data = result.point.data
             relaxed = StageResult(list(data.evaluations), data.kit, data.assignment, before.steps + result.steps,
                                   result.point.value, result.status, before.jumps + jumps)
-        return relaxed, self._result(designs, relaxed.kit, relaxed.assignment, jumps=jumps)
+        return relaxed, self.confirmed(self._result(designs, relaxed.kit, relaxed.assignment, jumps=jumps))
 
     # -- pieces ----------------------------------------------------------------------------------------------------
     def _relax(self, name: str, weight: float, q: np.ndarray, evaluations: Sequence[Evaluation], kit: Kit,
                fixed_kit: bool) -> tuple[SQPResult, RelaxedProblem]:
         settings = self.settings
         problem = RelaxedProblem(self.dataset, self.projection.with_weight(weight), kit, settings.bounds,
-                                 fixed_kit=fixed_kit)
+                                 settings.constraints, fixed_kit)
         options = SQPOptions(hessian=settings.hessian, max_steps=settings.relaxed_steps,
                              decrease_tolerance=settings.last_tolerance if weight >= settings.schedule[-1]
                              else settings.relaxed_tolerance)
@@ -272,13 +326,11 @@ class Stages:
 
     def _result(self, designs: list[Evaluation | SimulationFailure], kit: Kit, assignment: Assignment, steps: int = 0,
                 status: str = "", jumps: Sequence[Jump] = ()) -> StageResult:
-        """Confirm what was kept, and sum the objective up where no design failed."""
-        found = {n: d for n, d in enumerate(designs) if isinstance(d, Evaluation)}
-        for n, confirmed in self.dataset.confirm(found).items():
-            designs[n] = confirmed
-        complete = all(isinstance(d, Evaluation) for d in designs)
-        return StageResult(designs, kit, assignment, steps, self.dataset.value(designs) if complete else None, status,
-                           list(jumps))
+        return StageResult(designs, kit, assignment, steps, self._value(designs), status, list(jumps))
+
+    def _value(self, designs: Sequence[Evaluation | SimulationFailure]) -> float | None:
+        """The objective, where no design failed."""
+        return self.dataset.value(designs) if all(isinstance(d, Evaluation) for d in designs) else None
 
 
 def _restored(problem: Any, saved: Mapping[str, np.ndarray]) -> tuple[SQPState, Point, list[str]]:

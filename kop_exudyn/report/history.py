@@ -21,10 +21,19 @@ class HistoryStep:
 
     terms : its parts by name; their sum is the objective
     weight : w_c of the projection energy at that step, None without one
+    round : of the assigned stage, before which elements got other parts; None without rounds
     """
 
     terms: Mapping[str, float]
     weight: float | None = None
+    round: int | None = None
+
+    @property
+    def stretch(self) -> str:
+        """What the steps have in common that belong to one SQP, as it is written above them."""
+        if self.round is not None:
+            return f"round {self.round}"
+        return f"$w_c$ = {_power(self.weight)}" if self.weight is not None else ""
 
     @property
     def value(self) -> float:
@@ -40,7 +49,7 @@ class History:
 
 
 def draw_history(histories: Sequence[History]) -> Figure:
-    """One panel a stage, logarithmic, on one scale; where w_c changes there is a line with its new value."""
+    """One panel a stage, logarithmic, on one scale; where w_c changes or a round begins there is a line that says so."""
     names = list(dict.fromkeys(name for history in histories for step in history.steps for name in step.terms))
     colours = {name: CYCLE[k % len(CYCLE)] for k, name in enumerate(names)}
     widths = [max(len(history.steps), 1) for history in histories]
@@ -73,14 +82,14 @@ def _draw_stage(ax: Axes, history: History, colours: Mapping[str, str]) -> None:
             ax.plot(*_broken(history.steps, name), color=colour, label=name, marker=marker, markersize=2.5,
                     linewidth=1.2)
     ax.plot(*_broken(history.steps), color=INK, label="objective", marker=marker, markersize=3.5, linewidth=2.2)
-    _mark_weights(ax, history)
+    _mark_stretches(ax, history)
 
 
 def _broken(steps: Sequence[HistoryStep], name: str | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Step numbers and a term's values (default: the sum), with a gap where the weight changes and with it J."""
+    """Step numbers and a term's values (default: the sum), with a gap where the next SQP begins: J may jump there."""
     places, values = [], []
     for number, step in enumerate(steps, 1):
-        if number > 1 and step.weight != steps[number - 2].weight:
+        if number > 1 and step.stretch != steps[number - 2].stretch:
             places.append(number - 0.5)
             values.append(np.nan)
         places.append(number)
@@ -88,17 +97,17 @@ def _broken(steps: Sequence[HistoryStep], name: str | None = None) -> tuple[np.n
     return np.array(places), np.array(values)
 
 
-def _mark_weights(ax: Axes, history: History) -> None:
-    """A line between the steps where the weight changes, and every weight's value at the top of its stretch."""
+def _mark_stretches(ax: Axes, history: History) -> None:
+    """A line between the steps of two SQPs, and what each was for at the top of its stretch."""
     first = 1
-    for weight, run in groupby(history.steps, key=lambda step: step.weight):
+    for label, run in groupby(history.steps, key=lambda step: step.stretch):
         count = len(list(run))
-        if weight is not None:
+        if label:
             if first > 1:
                 ax.axvline(first - 0.5, color=QUIET, linewidth=0.9, linestyle=(0, (4, 3)), zorder=0)
-            ax.text(first - 0.5 + 0.008 * len(history.steps), 0.985, f"$w_c$ = {_power(weight)}", color=QUIET, size=8,
+            ax.text(first - 0.5 + 0.008 * len(history.steps), 0.985, label, color=QUIET, size=8,
                     transform=ax.get_xaxis_transform(), va="top",
-                    rotation=90 if count < 0.12 * len(history.steps) else 0)
+                    rotation=90 if count < 0.25 * len(history.steps) else 0)
         first += count
 
 

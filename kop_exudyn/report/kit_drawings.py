@@ -42,13 +42,12 @@ def drawn_state(design: Design, outcome: Evaluation | SimulationFailure, title: 
 
 
 def histories(result: KitResult) -> list[History]:
-    """The accepted steps of both stages; the relaxed one's with all its rounds after each other."""
+    """The accepted steps of both stages, with all values of w_c and all rounds after each other."""
     titles = {"relaxed": "relaxed: all elements", "assigned": "assigned: parts only"}
     steps: dict[str, list[HistoryStep]] = {stage: [] for stage in titles}
     for event in result.events:
-        stage = "relaxed" if event.weight is not None else event.stage
-        if stage in steps:
-            steps[stage].append(HistoryStep(event.terms, event.weight))
+        if event.stage in steps:
+            steps[event.stage].append(HistoryStep(event.terms, event.weight, event.round))
     return [History(title, steps[stage]) for stage, title in titles.items()]
 
 

@@ -4,16 +4,18 @@ from __future__ import annotations
 import hashlib
 import logging
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Iterator, Mapping, Sequence
 
 import numpy as np
+import scipy.sparse as sp
 from tqdm import tqdm
 from tqdm.contrib.logging import logging_redirect_tqdm
 
 from ..analysis.kit_result import KitResult
+from ..errors import InputError
 from ..io.checkpoint import Job
 from ..io.run_folder import RunFolder
 from ..kit.cluster import cluster
@@ -47,7 +49,7 @@ def optimize_kit(
     with _progress_bar(progress) as bar:
         def observe(event: StageEvent) -> None:
             events.append(event)
-            bar.set_postfix_str(f"{event.stage}: J = {event.record.value:.4g}", refresh=False)
+            bar.set_postfix_str(f"{event.sqp}: J = {event.record.value:.4g}", refresh=False)
             bar.update()
 
         outcome = run_job(designs, parts, settings, folder.store, observe, bar.set_description_str)
@@ -63,18 +65,27 @@ def _check_request(designs: Sequence[Design], parts: Mapping[str, int], settings
     offsets = np.cumsum([0, *(len(design.parameters) for design in designs)])
     groups = [group.shifted(offset) for design, offset in zip(designs, offsets) for group in design.groups]
     q = np.concatenate([design.parameters for design in designs])
+    constraints = settings.stages.constraints
+    if constraints is not None and constraints.A.shape[1] != len(q):
+        raise InputError(f"are on {constraints.A.shape[1]} parameters, the designs have {len(q)}", field="constraints")
     cluster(groups, q, parts, bounds=settings.stages.bounds, restarts=1)
 
 
 def _described(designs: Sequence[Design], parts: Mapping[str, int], settings: JobSettings) -> dict[str, Any]:
-    """All that the result depends on; the number of processes is not part of it."""
-    values = asdict(settings)
+    """All that the result depends on, as plain data; the number of processes is not part of it."""
+    constraints = settings.stages.constraints
+    values = asdict(replace(settings, stages=replace(settings.stages, constraints=None)))
+    if constraints is not None:
+        rows = sp.csr_array(constraints.A)
+        rows.sort_indices()
+        numbers = (rows.indptr, rows.indices, rows.data, constraints.lower, constraints.upper)
+        values["stages"]["constraints"] = {"rows": constraints.rows, "digest": _digest(*numbers)}
     del values["jobs"]
     return {"designs": [design.name for design in designs], "parts": dict(parts), **values}
 
 
-def _digest(values: np.ndarray) -> str:
-    return hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
+def _digest(*arrays: np.ndarray) -> str:
+    return hashlib.sha256(b"".join(np.ascontiguousarray(a, dtype=float).tobytes() for a in arrays)).hexdigest()
 
 
 @contextmanager

@@ -20,7 +20,7 @@ trimesh = pytest.importorskip("trimesh")
 def result(shells):
     """Two accepted steps a stage: the files don't need more."""
     settings = JobSettings(jobs=1, baselines=False, stages=StageSettings(
-        schedule=(1e4,), relaxed_steps=2, assigned_steps=2, path_steps=3, rescues=0))
+        schedule=(1e4,), relaxed_steps=2, assigned_steps=2, reassignments=0, path_steps=3))
     outcome = run_job(shells, {"linear": 3, "angular": 2}, settings)
     return KitResult(shells, outcome.references, outcome.stages)
 

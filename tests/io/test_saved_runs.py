@@ -13,7 +13,7 @@ from kop_exudyn.optimize.stages import StageSettings
 @pytest.fixture(scope="module")
 def finished(shells, tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
-    stages = StageSettings(schedule=(1e4,), relaxed_steps=1, assigned_steps=1, path_steps=2, rescues=0)
+    stages = StageSettings(schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2)
     outcome = run_job(shells, {"linear": 3, "angular": 2}, JobSettings(jobs=1, baselines=False, stages=stages))
     result = KitResult(shells, outcome.references, outcome.stages)
     save_result(folder / "result.json", result.to_dict())

@@ -53,7 +53,7 @@ def shell(name, bow):
 @pytest.fixture(scope="module")
 def result():
     designs = [shell("flat", 0.1), shell("bent", 0.16)]
-    stages = StageSettings(schedule=(1e4,), relaxed_steps=1, assigned_steps=1, path_steps=2, rescues=0)
+    stages = StageSettings(schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2)
     outcome = run_job(designs, {"linear": 2, "angular": 2}, JobSettings(jobs=1, baselines=False, stages=stages))
     return KitResult(designs, outcome.references, outcome.stages)
 

@@ -76,4 +76,4 @@ def fingerprint(outcome: JobOutcome, events: Sequence[Any] = ()) -> dict[str, An
                         for e in stage.designs],
         }
     return {"stages": stages, "events": [
-        (e.stage, e.record.step, e.record.value, e.record.gradient_norm, json.dumps(dict(e.terms))) for e in events]}
+        (e.sqp, e.record.step, e.record.value, e.record.gradient_norm, json.dumps(dict(e.terms))) for e in events]}
