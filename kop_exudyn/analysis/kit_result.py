@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Mapping
+from typing import Any, Mapping, Sequence
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ..optimize.stages import StageEvent, StageResult
 from ..structures.base import Design
 
 STAGES = ("direct", "unrelaxed", "relaxed", "assigned")
+_SAME = 1e-3  # of the bounding box: states whose joints are this close are one
 
 
 @dataclass
@@ -22,6 +23,7 @@ class KitResult:
     designs, references : what was asked for
     stages : by name ("direct", "unrelaxed", "relaxed", "assigned")
     events : accepted steps of all SQPs, in order
+    redeployed : by design, the state that the assigned parts open into by themselves; empty where it wasn't computed
     equilibria, newton_iterations : solved in all
     settings : as given, for the record
     """
@@ -35,6 +37,7 @@ class KitResult:
     wall_s: float = 0.0
     peak_memory_mb: float = 0.0
     settings: Mapping[str, Any] = field(default_factory=dict)
+    redeployed: Sequence[Evaluation | SimulationFailure] = ()
 
     @property
     def kit(self) -> Kit:
@@ -50,12 +53,33 @@ class KitResult:
         outcome = self.stages[stage].designs[number]
         return summary_of(outcome, self.designs[number], self.references[number])
 
+    def redeployment(self, number: int) -> dict[str, Any]:
+        """Where the assigned design's parts open into by themselves: fit, energy, and whether it's the kept state.
+
+        {"failed": why} where that deployment (or the design) failed.
+        """
+        opened, kept = self.redeployed[number], self.stages["assigned"].designs[number]
+        for outcome in (opened, kept):
+            if isinstance(outcome, SimulationFailure):
+                return {"failed": str(outcome)}
+        role = self.designs[number].fitted_role.name
+        joints = [outcome.fit.placement.apply(outcome.equilibria[role].state.positions[self.designs[number].joints])
+                  for outcome in (opened, kept)]
+        moved = float(np.linalg.norm(joints[0] - joints[1], axis=1).max()) / opened.fit.diagonal
+        energy = opened.equilibria[role].elastic_energy
+        return {
+            "same_state": moved <= _SAME, "moved_percent": 100 * moved,
+            "fit": {"max_percent": opened.fit.max_percent, "mean_percent": opened.fit.mean_percent},
+            "elastic_energy": energy, "energy_ratio": energy / self.references[number].energy,
+        }
+
     def to_dict(self) -> dict[str, Any]:
         """As result.json has it."""
         return {
             "designs": [
                 {"name": design.name, "elements": design.n_elements,
-                 **{stage: self.summary(stage, n) for stage in STAGES if stage in self.stages}}
+                 **{stage: self.summary(stage, n) for stage in STAGES if stage in self.stages},
+                 **({"redeployed": self.redeployment(n)} if self.redeployed else {})}
                 for n, design in enumerate(self.designs)],
             "kit": {kind: _plain(parts) for kind, parts in self.kit.parts.items()},
             "assignment": self.assignment.to_dict(),

@@ -4,10 +4,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Callable, Mapping, Sequence
 
+from ..errors import SimulationFailure
 from ..kit.parts import Kit
 from ..structures.base import Design
 from .dataset import Dataset
-from .objective import Reference, Weights
+from .objective import Evaluation, Reference, Weights
 from .pool import DesignPool
 from .rounds import in_rounds
 from .stages import Observer, StageResult, Stages, StageSettings, Store
@@ -33,10 +34,18 @@ class JobSettings:
 
 @dataclass
 class JobOutcome:
-    """What `run_job` found: the references of all designs, the stages by name, and the cost."""
+    """What `run_job` found.
+
+    references : of all designs
+    stages : by name
+    redeployed : by design, the state in which the assigned parts end when they are opened from their flat (or compact)
+        assembly, not led there from the relaxed design: bending-active structures have several stable states
+    equilibria, newton_iterations : solved in all
+    """
 
     references: list[Reference]
     stages: dict[str, StageResult] = field(default_factory=dict)
+    redeployed: list[Evaluation | SimulationFailure] = field(default_factory=list)
     equilibria: int = 0
     newton_iterations: int = 0
 
@@ -72,5 +81,7 @@ def run_job(
         found["relaxed"], at_parts = stages.to_parts(relaxed, fixed_kit=kit is not None)
         announce("assigned stage")
         found["assigned"] = in_rounds(stages, at_parts, fixed_kit=kit is not None)
+        announce("deployment of the assigned designs")
+        outcome.redeployed = stages.redeployed(found["assigned"])
         outcome.equilibria, outcome.newton_iterations = dataset.tally.equilibria, dataset.tally.newton_iterations
     return outcome

@@ -232,6 +232,12 @@ class Stages:
             designs[n] = evaluation
         return replace(result, designs=designs, value=self._value(designs))
 
+    def redeployed(self, result: StageResult) -> list[Evaluation | SimulationFailure]:
+        """Every design built of the result's parts and deployed from its own starting geometry."""
+        q = result.assignment.matrix(result.kit) @ result.kit.vector
+        found = self.dataset.redeploy(q, range(len(result.designs)))
+        return [found[n] for n in range(len(result.designs))]
+
     def to_parts(self, relaxed: StageResult, fixed_kit: bool = False) -> tuple[StageResult, StageResult]:
         """Follow the straight path from the relaxed elements to their parts, watching for snaps.
 

@@ -105,12 +105,28 @@ def final_states(result: KitResult) -> dict[tuple[str, str, str], object]:
             if isinstance(outcome, Evaluation) for role, equilibrium in outcome.equilibria.items()}
 
 
-def remarks(stages: Mapping[str, StageResult]) -> list[str]:
-    """What a reader should know besides the figures: snaps on the way to the parts, and why each SQP stopped."""
+def remarks(result: KitResult) -> list[str]:
+    """What a reader should know besides the figures: snaps, other states that designs open into, why SQPs stopped."""
+    stages = result.stages
     found = [f"{jump.design} snapped at {jump.fraction:.0%} of the way to its parts: {jump.distance:.1%} of its size."
              for jump in stages["assigned"].jumps]
+    found += [_about_opening(design.name, result.redeployment(n), result.summary("assigned", n))
+              for n, design in enumerate(result.designs) if result.redeployed]
+    found = [remark for remark in found if remark]
     return found + [f"The {name} stage ended after {stage.steps} steps: {stage.status}."
                     for name, stage in stages.items() if stage.status]
+
+
+def _about_opening(name: str, opened: Mapping, kept: Mapping) -> str:
+    """A sentence where a design, opened from its flat or compact assembly, ends in another state than the kept one."""
+    if "failed" in kept or opened.get("same_state"):
+        return ""
+    if "failed" in opened:
+        return f"{name} could not be opened from its assembly: {opened['failed']}."
+    ratio = opened["elastic_energy"] / kept["elastic_energy"]
+    return (f"{name} has several stable states: opened from its assembly without guidance it settles "
+            f"{opened['moved_percent']:.1f} % of its size from the one shown, at {ratio:.3f} times its elastic energy "
+            f"({opened['fit']['max_percent']:.2f} % from the target at most); it has to be led into the one shown.")
 
 
 def _fit(summary: Mapping, name: str) -> float | None:

@@ -42,7 +42,7 @@ def _page(result: KitResult, figures: dict) -> Page:
                "Distance of the joints from the target surface, in % of its bounding-box diagonal; elastic energy "
                "relative to the input design's. Direct: every input element replaced by its part. Unrelaxed: parts "
                "then tuned. Relaxed: elements still free. Assigned: built from the kit. A dash: no equilibrium found.")
-    page.text("\n\n".join(remarks(result.stages)))
+    page.text("\n\n".join(remarks(result)))
     page.section("The designs").figure(
         figures["designs"], "Rods and joints at the best placement on the target; grey: the input design.",
         alt="Every design in 3D after the direct projection, the relaxed and the assigned stage")

@@ -55,7 +55,8 @@ def optimize_kit(
         outcome = run_job(designs, parts, settings, folder.store, observe, bar.set_description_str)
     result = KitResult(
         list(designs), outcome.references, outcome.stages, events, outcome.equilibria, outcome.newton_iterations,
-        perf_counter() - begin, peak_memory_mb(), described | {"jobs": settings.jobs})
+        perf_counter() - begin, peak_memory_mb(), described | {"jobs": settings.jobs},
+        outcome.redeployed)
     write_kit_report(result, folder.path)
     return result
 
