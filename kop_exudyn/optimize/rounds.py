@@ -8,16 +8,22 @@ from typing import Sequence
 import numpy as np
 
 from ..errors import SimulationFailure
-from .objective import DesignDerivatives
+from .objective import DesignDerivatives, Evaluation
 from .reassign import LocalModel, Reassignment, reassign
-from .stages import StageResult, Stages
+from .stages import StageResult, Stages, mixed
 
 log = logging.getLogger(__name__)
 
 # How far the model reaches is known only after a trial, and a trial costs little next to an SQP: try several.
-_DAMPINGS = (1e-1, 1e-2, 1e-3, 1e-4)
+_DAMPINGS = (1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5)
+_TRIALS = 3  # of a kind, those by which no element changes aside
 _MISLED = 0.1  # a design that ends above its prediction by this share of the promised gain keeps its parts at first
 _PATIENCE = 1.1  # the SQP has to show what a trial is worth, unless J is larger than before by this factor
+_FAR_OFF = 2.0  # times J
+_REPEATS = 4  # reassignments before an SQP
+_WORTHWHILE = 0.97  # of J: another reassignment comes before the SQP while they lower it by this factor
+
+_Trial = tuple[StageResult, Reassignment, float]  # what came of a reassignment, and the damping of its model
 
 
 def in_rounds(stages: Stages, start: StageResult, fixed_kit: bool = False) -> StageResult:
@@ -25,21 +31,31 @@ def in_rounds(stages: Stages, start: StageResult, fixed_kit: bool = False) -> St
 
     fixed_kit : keep the parts (projection onto an existing kit), only the assignment changes
     """
-    settings, best = stages.settings, start
+    settings, best, steps = stages.settings, start, start.steps
     if settings.reassignments == 0:
         return start if fixed_kit else stages.assigned(start)
     for number in range(1, settings.reassignments + 1):
-        trial = _best_trial(stages, best, fixed_kit)
-        if trial is None and number > 1:
+        result = _many_reassigned(stages, best, fixed_kit)
+        if result is best and (fixed_kit or number > 1):
             break
-        result = trial or best
         if not fixed_kit:
             result = stages.assigned(result, f"assigned-{number}", settings.round_steps)
-        steps = best.steps + result.steps
-        better = best.value is None or result.value is not None and result.value < best.value
-        gain = np.inf if best.value is None or result.value is None else best.value - result.value
-        best = replace(result if better else best, steps=steps, jumps=start.jumps)
-        if gain < settings.reassigned_tolerance * abs(best.value or 0.0):
+        steps += result.steps if result is not best else 0
+        last, best = best, min((best, result), key=_value)
+        if np.isfinite(_value(last)) and _value(last) - _value(best) < settings.reassigned_tolerance * _value(last):
+            break
+    return replace(best, steps=steps, jumps=start.jumps)
+
+
+def _many_reassigned(stages: Stages, best: StageResult, fixed_kit: bool) -> StageResult:
+    """Reassigned again and again while that alone gains: each time costs less than the SQP that follows."""
+    for _ in range(_REPEATS):
+        trial = _best_trial(stages, best, fixed_kit)
+        if trial is None:
+            break
+        enough = _value(trial) > _WORTHWHILE * _value(best)
+        best = trial
+        if enough:
             break
     return best
 
@@ -49,22 +65,48 @@ def _best_trial(stages: Stages, best: StageResult, fixed_kit: bool) -> StageResu
     if best.value is None:  # a design failed: there is no model of it
         return None
     derivatives = stages.dataset.derivatives(best.designs, hessian=True)
-    tried = [t for t in (_trial(stages, best, derivatives, damping, (), fixed_kit) for damping in _DAMPINGS) if t]
-    if not tried:
-        return None
-    trial, found, damping = min(tried, key=lambda t: _value(t[0]))
-    misled = _misled(stages, best, trial, found)
-    if misled and len(misled) < len(best.designs):
-        careful = _trial(stages, best, derivatives, damping, misled, fixed_kit)
-        trial = min((trial, careful[0]), key=_value) if careful else trial
-    if _value(trial) >= (1.0 if fixed_kit else _PATIENCE) * best.value:
+    trials = [_each_its_own(stages, best, derivatives)]
+    if not fixed_kit:
+        trials += _together(stages, best, derivatives)
+    found = [trial for trial in trials if trial is not None]
+    if not found or _value(trial := min(found, key=_value)) >= _PATIENCE * best.value:
         return None
     trial = stages.confirmed(trial)
     return trial if trial.value is not None else None
 
 
+def _each_its_own(stages: Stages, best: StageResult, derivatives: Sequence[DesignDerivatives]) -> StageResult | None:
+    """With the parts as they are the designs don't depend on each other: each takes the best of its trials, if any."""
+    results = [best, *(trial for trial, _, _ in _several(stages, best, derivatives, True))]
+    chosen = [min(results, key=lambda result: _share(result, n)) for n in range(len(best.designs))]
+    return None if all(result is best for result in chosen) else stages.judged(mixed(chosen, stages.dataset))
+
+
+def _together(stages: Stages, best: StageResult, derivatives: Sequence[DesignDerivatives]) -> list[StageResult]:
+    """Trials in which the parts move along; the best one also without the designs that the model was wrong about."""
+    found = _several(stages, best, derivatives, False)
+    if found:
+        trial, changed, damping = min(found, key=lambda t: _value(t[0]))
+        misled = _misled(stages, best, trial, changed)
+        if misled and len(misled) < len(best.designs):
+            found += [t] if (t := _trial(stages, best, derivatives, damping, misled)) else []
+    return [trial for trial, _, _ in found]
+
+
+def _several(stages: Stages, best: StageResult, derivatives: Sequence[DesignDerivatives], fixed_kit: bool
+             ) -> list[_Trial]:
+    """The most cautious trials in which anything changes, up to one that is far off: bolder ones rarely are better."""
+    found: list[_Trial] = []
+    for damping in _DAMPINGS:
+        trial = _trial(stages, best, derivatives, damping, (), fixed_kit)
+        found += [trial] if trial is not None else []
+        if len(found) == _TRIALS or trial is not None and _value(trial[0]) > _FAR_OFF * _value(best):
+            break
+    return found
+
+
 def _trial(stages: Stages, best: StageResult, derivatives: Sequence[DesignDerivatives], damping: float,
-           frozen: Sequence[int], fixed_kit: bool) -> tuple[StageResult, Reassignment, float] | None:
+           frozen: Sequence[int] = (), fixed_kit: bool = False) -> _Trial | None:
     """The designs rebuilt of the parts that the model prefers; None where it prefers those that they have."""
     dataset = stages.dataset
     model = LocalModel.of(derivatives, dataset.design_weights, dataset.split(dataset.scales()), damping)
@@ -72,13 +114,18 @@ def _trial(stages: Stages, best: StageResult, derivatives: Sequence[DesignDeriva
     if found is None:
         return None
     trial = stages.built_from(found.kit, found.assignment, best.designs)
-    log.info("other parts for %d elements (damping %g): J = %.5g, predicted %.5g", found.changes, damping,
-             _value(trial), best.value + found.predicted.sum())
+    log.info("other parts for %d elements (damping %g%s): J = %.5g, predicted %.5g", found.changes, damping,
+             ", same kit" if fixed_kit else "", _value(trial), best.value + found.predicted.sum())
     return trial, found, damping
 
 
 def _value(result: StageResult) -> float:
     return np.inf if result.value is None else result.value
+
+
+def _share(result: StageResult, design: int) -> float:
+    outcome = result.designs[design]
+    return outcome.value if isinstance(outcome, Evaluation) else np.inf
 
 
 def _misled(stages: Stages, best: StageResult, trial: StageResult, found: Reassignment) -> list[int]:

@@ -77,8 +77,8 @@ class StageSettings:
     relaxed_tolerance: float = 3e-3
     last_tolerance: float = 5e-4
     assigned_tolerance: float = 1e-4
-    reassignments: int = 5
-    reassigned_tolerance: float = 1e-2
+    reassignments: int = 4
+    reassigned_tolerance: float = 2e-2
     path_steps: int = 10
     rescues: int = 2
     growth: int = 0
@@ -224,13 +224,17 @@ class Stages:
         designs, jumps = self._to_parts(start, kit, assignment)
         return self._result(designs, kit, assignment, jumps=jumps)
 
+    def judged(self, result: StageResult) -> StageResult:
+        """The same result with the objective of its designs."""
+        return replace(result, value=self._value(result.designs))
+
     def confirmed(self, result: StageResult) -> StageResult:
         """The same result at Exudyn's own solutions; a design that Exudyn doesn't confirm becomes a failure."""
         found = {n: d for n, d in enumerate(result.designs) if isinstance(d, Evaluation)}
         designs = list(result.designs)
         for n, evaluation in self.dataset.confirm(found).items():
             designs[n] = evaluation
-        return replace(result, designs=designs, value=self._value(designs))
+        return self.judged(replace(result, designs=designs))
 
     def redeployed(self, result: StageResult) -> list[Evaluation | SimulationFailure]:
         """Every design built of the result's parts and deployed from its own starting geometry."""
@@ -358,6 +362,18 @@ def find_jump(design: Any, start: Evaluation, path: Sequence[Evaluation], diagon
     if moves[worst] > _JUMP_SHARE and moves[worst] > _JUMP_FACTOR * np.median(moves):
         return Jump(design.name, (worst + 1) / len(path), float(moves[worst]))
     return None
+
+
+def mixed(results: Sequence[StageResult], dataset: Dataset) -> StageResult:
+    """Each design from its own result, all of the same kit; its objective is to be judged anew."""
+    first = np.cumsum([0, *(len(design.groups) for design in dataset.designs)])
+
+    def pick(name: str) -> tuple[np.ndarray, ...]:
+        return tuple(rows for n, result in enumerate(results)
+                     for rows in getattr(result.assignment, name)[first[n]:first[n + 1]])
+
+    assignment = replace(results[0].assignment, part=pick("part"), variant=pick("variant"))
+    return StageResult([result.designs[n] for n, result in enumerate(results)], results[0].kit, assignment)
 
 
 def restrict(assignment: Assignment, dataset: Dataset, members: Sequence[int]) -> Assignment:
