@@ -41,6 +41,7 @@ class JobOutcome:
     redeployed : by design, the state in which the assigned parts end when they are opened from their flat (or compact)
         assembly, not led there from the relaxed design: bending-active structures have several stable states
     equilibria, newton_iterations : solved in all
+    peak_memory_mb : of this process and its workers together
     """
 
     references: list[Reference]
@@ -48,6 +49,7 @@ class JobOutcome:
     redeployed: list[Evaluation | SimulationFailure] = field(default_factory=list)
     equilibria: int = 0
     newton_iterations: int = 0
+    peak_memory_mb: float = 0.0
 
 
 def run_job(
@@ -83,5 +85,6 @@ def run_job(
         found["assigned"] = in_rounds(stages, at_parts, fixed_kit=kit is not None)
         announce("deployment of the assigned designs")
         outcome.redeployed = stages.redeployed(found["assigned"])
+        outcome.peak_memory_mb = pool.peak_memory_mb()
         outcome.equilibria, outcome.newton_iterations = dataset.tally.equilibria, dataset.tally.newton_iterations
     return outcome

@@ -2,9 +2,11 @@
 from __future__ import annotations
 
 import logging
+import os
 from typing import Any, Callable, Sequence
 
 from ..errors import SimulationFailure
+from ..memory import peak_memory_mb
 from ..structures.base import Design
 from .objective import DesignObjective, Reference, Weights, reference_of
 
@@ -31,6 +33,10 @@ def _call(number: int, reference: Reference | None, weights: Weights, method: st
         return getattr(_objectives[key], method)(*arguments)
     except SimulationFailure as failure:
         return failure
+
+
+def _worker_memory() -> tuple[int, float]:
+    return os.getpid(), peak_memory_mb()
 
 
 class DesignPool:
@@ -71,6 +77,15 @@ class DesignPool:
         """Call a method of the objectives of some designs: {number: arguments} -> {number: result or failure}."""
         tasks = [(n, self.references[n], weights, method, arguments) for n, arguments in calls.items()]
         return dict(zip(calls, self._run(tasks)))
+
+    def peak_memory_mb(self) -> float:
+        """Largest memory of this process and of every worker that is alive, added up; MB."""
+        found = {os.getpid(): peak_memory_mb()}
+        if self._parallel is not None:
+            from joblib import delayed
+
+            found |= dict(self._parallel(delayed(_worker_memory)() for _ in range(4 * self.jobs)))
+        return sum(found.values())
 
     def _run(self, tasks: list[tuple]) -> list[Any]:
         if self._parallel is None or len(tasks) < 2:

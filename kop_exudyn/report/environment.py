@@ -6,7 +6,7 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from .. import __version__
+from .. import __version__, memory
 
 # the packages whose versions can change numbers
 _PACKAGES = ("exudyn", "numpy", "scipy", "numba", "qdldl", "osqp", "piqp", "libigl")
@@ -37,10 +37,4 @@ def _version(package: str) -> str | None:
 
 def peak_memory_mb() -> float:
     """Largest memory of this process plus that of its largest ended subprocess, MB; 0 where the system doesn't tell."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return 0.0
-    unit = 1 if platform.system() == "Darwin" else 1024  # bytes there, else kilobytes
-    return sum(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
-               ) * unit / 2**20
+    return memory.peak_memory_mb() + memory.peak_memory_mb(of_ended_children=True)

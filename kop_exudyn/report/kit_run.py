@@ -22,7 +22,6 @@ from ..kit.cluster import cluster
 from ..optimize.job import JobSettings, run_job
 from ..optimize.stages import StageEvent
 from ..structures.base import Design
-from .environment import peak_memory_mb
 from .kit_report import write_kit_report
 
 
@@ -55,7 +54,7 @@ def optimize_kit(
         outcome = run_job(designs, parts, settings, folder.store, observe, bar.set_description_str)
     result = KitResult(
         list(designs), outcome.references, outcome.stages, events, outcome.equilibria, outcome.newton_iterations,
-        perf_counter() - begin, peak_memory_mb(), described | {"jobs": settings.jobs},
+        perf_counter() - begin, outcome.peak_memory_mb, described | {"jobs": settings.jobs},
         outcome.redeployed)
     write_kit_report(result, folder.path)
     return result

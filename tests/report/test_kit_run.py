@@ -169,3 +169,15 @@ def test_impossible_requests_fail_before_anything_is_written(tmp_path, parts, me
     with pytest.raises(InputError, match=message):
         optimize_kit(zigzags(), parts, out=tmp_path / "out", settings=SETTINGS)
     assert not (tmp_path / "out").exists()
+
+
+def test_memory_counts_live_workers(c_shell_data):
+    """Workers live on after a run and are no ended children: their memory would go unseen."""
+    from kop_exudyn.memory import peak_memory_mb
+    from kop_exudyn.optimize.pool import DesignPool
+    from kop_exudyn.structures.base import design_from_dict
+
+    designs = [design_from_dict(c_shell_data | {"name": name}, name) for name in "ab"]
+    with DesignPool(designs, 2) as pool:
+        pool.prepare()
+        assert pool.peak_memory_mb() > peak_memory_mb() + 50
