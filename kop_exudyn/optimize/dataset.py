@@ -80,14 +80,19 @@ class Dataset:
         """(n_q,) the inputs' parameters."""
         return np.concatenate([d.parameters for d in self.designs])
 
+    @property
+    def free(self) -> np.ndarray:
+        """(k,) places in the long vector that belong to no element, see `Design.free`."""
+        return np.concatenate([d.free + offset for d, offset in zip(self.designs, self.offsets)]).astype(int)
+
     def split(self, q: np.ndarray) -> list[np.ndarray]:
         """The designs' own parts of the long vector."""
         return np.split(q, self.offsets[1:-1])
 
     def scales(self) -> np.ndarray:
-        """(n_q,) typical size of every parameter: the kind's scale."""
+        """(n_q,) typical size of every parameter: the kind's scale, or the design's for those of no element."""
         q = self.parameters
-        out = np.ones(len(q))
+        out = np.concatenate([np.full(len(d.parameters), float(d.free_scale)) for d in self.designs])
         for kind in {g.kind for g in self.groups}:
             indices = np.concatenate([g.indices.ravel() for g in self.groups if g.kind == kind])
             out[indices] = part_kind(kind).scale(q[indices])

@@ -81,8 +81,9 @@ class RelaxedProblem:
 
 
 class AssignedProblem:
-    """J(p) = sum F(M p) over the parts p, every element being its part; the assignment is fixed.
+    """J(x) = sum F(M x) over x = (p, y): the parts p, every element being its part, and the parameters y of no element.
 
+    The assignment is fixed. M (n_q, n_p + k) is the assignment's for the parts, and puts y in its places.
     constraints : on the elements q = M p, as in `RelaxedProblem`
     """
 
@@ -90,13 +91,29 @@ class AssignedProblem:
                  constraints: LinearConstraints | None = None):
         self.dataset, self.kit, self.assignment = dataset, kit, assignment
         self.part_bounds, self.of_elements = bounds, constraints
-        self.matrix = sp.csr_matrix(assignment.matrix(kit))
-        self.lower, self.upper = kit.bounds(bounds)
+        self._free, self._n_parts = dataset.free, len(kit.vector)
+        places = sp.csr_matrix((np.ones(len(self._free)), (self._free, np.arange(len(self._free)))),
+                               shape=(assignment.n_q, len(self._free)))
+        self.matrix = sp.csr_matrix(sp.hstack([assignment.matrix(kit), places]))
+        unlimited = np.full(len(self._free), np.inf)
+        self.lower, self.upper = (np.append(side, sign * unlimited) for side, sign in zip(kit.bounds(bounds), (-1, 1)))
         self._limit_by_designs()
         self.n = len(self.lower)
         self.constraints = (constraints.through(self.matrix) if constraints is not None
                             else LinearConstraints.none(self.n))
         self.scale = self._scale()
+
+    def variables(self, q: np.ndarray) -> np.ndarray:
+        """x of the problem's kit, with the parameters of no element as they are in q (n_q,)."""
+        return np.append(self.kit.vector, q[self._free])
+
+    def kit_of(self, x: np.ndarray) -> Kit:
+        """The parts in x."""
+        return self.kit.with_vector(x[: self._n_parts])
+
+    def free_of(self, x: np.ndarray) -> np.ndarray:
+        """The parameters of no element in x."""
+        return x[self._n_parts:]
 
     def evaluate(self, x: np.ndarray, previous: Point | None) -> Point:
         before: DatasetPoint | None = previous.data if previous is not None else None
@@ -104,7 +121,7 @@ class AssignedProblem:
 
     def point(self, x: np.ndarray, evaluations: list[Evaluation]) -> Point:
         """The point of given evaluations."""
-        data = DatasetPoint(evaluations, self.kit.with_vector(x), self.assignment, _sum_terms(self.dataset, evaluations))
+        data = DatasetPoint(evaluations, self.kit_of(x), self.assignment, _sum_terms(self.dataset, evaluations))
         return Point(x, self.dataset.value(evaluations), data)
 
     def derivatives(self, point: Point) -> Derivatives:

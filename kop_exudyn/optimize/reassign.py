@@ -68,10 +68,12 @@ class LocalModel:
 
 @dataclass(frozen=True)
 class Reassignment:
-    """Another kit and assignment, what the model promises of them by design, and how many elements changed."""
+    """Another kit and assignment, the parameters of no element to go with them (k,), what the model promises of them
+    by design, and how many elements changed."""
 
     kit: Kit
     assignment: Assignment
+    free: np.ndarray
     predicted: np.ndarray
     changes: int
 
@@ -83,7 +85,7 @@ def reassign(problem: AssignedProblem, model: LocalModel, frozen: Sequence[int] 
     frozen : designs whose elements keep their parts. Elements of kinds that realise intervals keep theirs too.
     Returns None where no element gains by another part, or the constraints can't be met with what it would get.
     """
-    before, vector = problem.assignment, problem.kit.vector
+    before, vector = problem.assignment, problem.variables(np.concatenate(model.base))
     start = value = model.values(problem.dataset.split(problem.matrix @ vector)).sum()
     current = problem
     for _ in range(_ROUNDS):
@@ -101,12 +103,12 @@ def reassign(problem: AssignedProblem, model: LocalModel, frozen: Sequence[int] 
     if not changes:
         return None
     predicted = model.values(problem.dataset.split(current.matrix @ vector))
-    return Reassignment(problem.kit.with_vector(vector), current.assignment, predicted, changes)
+    return Reassignment(problem.kit_of(vector), current.assignment, problem.free_of(vector), predicted, changes)
 
 
 def _sweep(problem: AssignedProblem, vector: np.ndarray, model: LocalModel, frozen: Sequence[int]) -> Assignment | None:
     """Give every element its best part, the parts staying as they are; None when all have theirs."""
-    dataset, kit = problem.dataset, problem.kit.with_vector(vector)
+    dataset, kit = problem.dataset, problem.kit_of(vector)
     q = [part.copy() for part in dataset.split(problem.matrix @ vector)]
     slopes = model.slopes(q)
     parts, variants = list(problem.assignment.part), list(problem.assignment.variant)
@@ -163,7 +165,7 @@ def _descend(q, slope, hessian, indices, candidates, choice, least):
 
 
 def _best_parts(problem: AssignedProblem, vector: np.ndarray, model: LocalModel) -> np.ndarray | None:
-    """(n_p,) the parts that minimise m(M p) within bounds and constraints; None where these can't be met."""
+    """(n_p + k,) the variables that minimise m(M x) within bounds and constraints; None where these can't be met."""
     rows = [problem.matrix[a:b] for a, b in zip(problem.dataset.offsets, problem.dataset.offsets[1:])]
     slopes = model.slopes(problem.dataset.split(problem.matrix @ vector))
     gradient = sum(m.T @ s for m, s in zip(rows, slopes))

@@ -113,7 +113,7 @@ def _trial(stages: Stages, best: StageResult, derivatives: Sequence[DesignDeriva
     found = reassign(stages.assigned_problem(best, range(len(best.designs))), model, frozen, fixed_kit)
     if found is None:
         return None
-    trial = stages.built_from(found.kit, found.assignment, best.designs)
+    trial = stages.built_from(found.kit, found.assignment, best.designs, found.free)
     log.info("other parts for %d elements (damping %g%s): J = %.5g, predicted %.5g", found.changes, damping,
              ", same kit" if fixed_kit else "", _value(trial), best.value + found.predicted.sum())
     return trial, found, damping

@@ -200,7 +200,8 @@ class Stages:
         except InputError as error:
             log.warning("%s: the elements' constraints can't be met by these parts: %s", name, error)
             return replace(start, status="the constraints can't be met by these parts", jumps=[])
-        point = problem.point(start.kit.vector.copy(), [start.designs[n] for n in members])
+        evaluations = [start.designs[n] for n in members]
+        point = problem.point(problem.variables(np.concatenate([e.q for e in evaluations])), evaluations)
         options = SQPOptions(hessian=self.settings.hessian, secant=True, max_steps=max_steps or self.settings.assigned_steps,
                              decrease_tolerance=self.settings.assigned_tolerance)
         result = self._sqp(name, problem, point, options, None)
@@ -219,9 +220,13 @@ class Stages:
         return AssignedProblem(self.dataset.subset(members), start.kit,
                                restrict(start.assignment, self.dataset, members), self.settings.bounds, constraints)
 
-    def built_from(self, kit: Kit, assignment: Assignment, start: Sequence[Evaluation]) -> StageResult:
-        """All designs followed from evaluations to the parts of another kit or assignment; not confirmed yet."""
-        designs, jumps = self._to_parts(start, kit, assignment)
+    def built_from(self, kit: Kit, assignment: Assignment, start: Sequence[Evaluation],
+                   free: np.ndarray | None = None) -> StageResult:
+        """All designs followed from evaluations to the parts of another kit or assignment; not confirmed yet.
+
+        free : (k,) new values of the parameters of no element; default: they stay
+        """
+        designs, jumps = self._to_parts(start, kit, assignment, free)
         return self._result(designs, kit, assignment, jumps=jumps)
 
     def judged(self, result: StageResult) -> StageResult:
@@ -238,7 +243,9 @@ class Stages:
 
     def redeployed(self, result: StageResult) -> list[Evaluation | SimulationFailure]:
         """Every design built of the result's parts and deployed from its own starting geometry."""
-        q = result.assignment.matrix(result.kit) @ result.kit.vector
+        places = [d.q if isinstance(d, Evaluation) else design.parameters
+                  for d, design in zip(result.designs, self.dataset.designs)]
+        q = self._realised(result.kit, result.assignment, np.concatenate(places)[self.dataset.free])
         found = self.dataset.redeploy(q, range(len(result.designs)))
         return [found[n] for n in range(len(result.designs))]
 
@@ -314,10 +321,18 @@ class Stages:
         log.info("%s: %d steps, J = %.6g, %s", name, result.steps, result.point.value, result.status)
         return result
 
-    def _to_parts(self, start: Sequence[Evaluation], kit: Kit, assignment: Assignment
+    def _realised(self, kit: Kit, assignment: Assignment, free: np.ndarray) -> np.ndarray:
+        """(n_q,) every element its part, and the parameters of no element (k,) as given."""
+        q = assignment.matrix(kit) @ kit.vector
+        q[self.dataset.free] = free
+        return q
+
+    def _to_parts(self, start: Sequence[Evaluation], kit: Kit, assignment: Assignment, free: np.ndarray | None = None,
                   ) -> tuple[list[Evaluation | SimulationFailure], list[Jump]]:
         """Follow all designs to their parts; one that fails on the way is deployed there from scratch instead."""
-        q = assignment.matrix(kit) @ kit.vector
+        if free is None:
+            free = np.concatenate([e.q for e in start])[self.dataset.free]
+        q = self._realised(kit, assignment, free)
         outcomes = self.dataset.follow(q, start, self.settings.path_steps)
         designs: list[Evaluation | SimulationFailure] = []
         jumps = []

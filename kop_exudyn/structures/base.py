@@ -82,6 +82,8 @@ class Design(ABC):
     # Weight of the fit in the objective, against 0.02 for the energy, that suits the class: stiff structures whose
     # shape hardly depends on their parts need more of it, those with many soft modes less.
     fit_weight: ClassVar[float] = 1e4
+    # Typical change of parameters that belong to no element.
+    free_scale: float = 1.0
     name: str
     parameters: np.ndarray
     lower: np.ndarray
@@ -125,6 +127,12 @@ class Design(ABC):
     def __getstate__(self) -> dict[str, Any]:
         """What travels to another process: everything but the solver workspaces, which are made anew there."""
         return {key: value for key, value in self.__dict__.items() if key != "systems"}
+
+    @property
+    def free(self) -> np.ndarray:
+        """(k,) parameters that belong to no element, such as places of supports: no part has to realise them."""
+        used = [group.indices.ravel() for group in self.groups]
+        return np.setdiff1d(np.arange(len(self.parameters)), np.concatenate(used) if used else used)
 
     @property
     def n_elements(self) -> int:

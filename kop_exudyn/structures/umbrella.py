@@ -13,6 +13,7 @@ from .base import Design, ElementGroup, Role, Target, register
 from .umbrella_bodies import RODS, joint_bodies
 from .umbrella_layout import BaseMesh, Plates, umbrella_mesh
 from .umbrella_mesh import UmbrellaMesh, UmbrellaTarget
+from .umbrella_pins import Pins, pins_from_dict
 from .umbrella_release import release_mesh
 
 if TYPE_CHECKING:
@@ -47,6 +48,8 @@ class Deployment:
 class Umbrella(Design):
     """An umbrella mesh. Its parameters are the arm lengths: top and bottom of every cell, one cell after the other.
 
+    Where joints are pinned, their positions follow as further parameters, which belong to no element.
+
     Parameters
     ----------
     name : the design's name
@@ -55,6 +58,7 @@ class Umbrella(Design):
     arm_elements, plate_elements : rod elements in an arm and in a plate rod
     plate_model : "rods", or "rigid": plates as bodies that don't bend, with fewer unknowns
     least_length : lower bound of arm lengths, default 32/30 of the plate edge
+    pins : supports in the final state; without them the central X joint is held
     deployment : how it is opened
     """
 
@@ -63,16 +67,22 @@ class Umbrella(Design):
 
     def __init__(self, name: str, mesh: UmbrellaMesh, *, arms: Material = Material(1400.0, 0.35),
                  plates: Material = Material(14000.0, 0.35), arm_elements: int = 3, plate_elements: int = 1,
-                 plate_model: str = RODS, least_length: float | None = None, deployment: Deployment = Deployment()):
-        self.name, self.mesh, self.deployment = name, mesh, deployment
+                 plate_model: str = RODS, least_length: float | None = None, pins: Pins | None = None,
+                 deployment: Deployment = Deployment()):
+        self.name, self.mesh, self.pins, self.deployment = name, mesh, pins, deployment
         self.arms, self.plates = arms, plates
         self.arm_elements, self.plate_elements, self.plate_model = arm_elements, plate_elements, plate_model
         self._bodies = joint_bodies(mesh, plate_model)
-        self.parameters = mesh.lengths.ravel()
-        least = _LEAST_LENGTH * mesh.plate_edge if least_length is None else least_length
-        self.lower = np.minimum(least, self.parameters)
-        self.upper = np.full(len(self.parameters), np.inf)
-        self.groups = [ElementGroup("cell", np.arange(2 * mesh.n_cells).reshape(-1, 2))]
+        lengths = mesh.lengths.ravel()
+        self.least_length = _LEAST_LENGTH * mesh.plate_edge if least_length is None else least_length
+        self.parameters, self.free_scale = lengths, float(np.median(lengths))
+        self.lower, self.upper = np.minimum(self.least_length, lengths), np.full(len(lengths), np.inf)
+        if pins is not None:
+            places = pins.positions.ravel()
+            self.parameters = np.concatenate([lengths, places])
+            self.lower = np.concatenate([self.lower, places - pins.reach])
+            self.upper = np.concatenate([self.upper, places + pins.reach])
+        self.groups = [ElementGroup("cell", np.arange(lengths.size).reshape(-1, 2))]
         self.joints = self._bodies.body[mesh.crossings]
 
     @classmethod
@@ -85,14 +95,20 @@ class Umbrella(Design):
         from .umbrella_scene import UmbrellaModel, umbrella_scene
 
         return umbrella_scene(self.mesh, UmbrellaModel(self.arm_elements, self.plate_elements, self.arms, self.plates,
-                                                       self.plate_model))
+                                                       self.plate_model), len(self.parameters))
 
     def scene(self, role: str = "deployed") -> Scene:
-        """The final state's scene: actuators of weight 1, no attraction, the central X joint pinned."""
-        return self._pinned
+        """The final state's scene: actuators of weight 1, no attraction, pins or the central X joint held."""
+        return self._held if self.pins is None else self._pinned
 
     @cached_property
     def _pinned(self) -> Scene:
+        """With the design's pins."""
+        return self.pins.scene(self._model.scene, self.joints[self.pins.joints], self.mesh.lengths.size)
+
+    @cached_property
+    def _held(self) -> Scene:
+        """With the central X joint held."""
         scene = self._model.scene
         pinned = np.zeros(scene.n_dofs, bool)
         centre = self.joints[self.mesh.central_crossing]
@@ -103,13 +119,13 @@ class Umbrella(Design):
         """Open the mesh from its compact state.
 
         The actuators' weight grows in steps under the attraction; then the attraction is taken away and the central
-        X joint held where it is. Raises SimulationFailure.
+        X joint held where it is, or the mesh laid on its pins. Raises SimulationFailure.
         """
         from ..equilibrium.newton import NewtonOptions, solve
         from ..equilibrium.system import System
 
         q = self.parameters if q is None else np.asarray(q, float)
-        scene, attraction = self._model.scene if self.mesh.target else self._pinned, self.attractions()
+        scene, attraction = self._model.scene if self.mesh.target else self._held, self.attractions()
         options, done = NewtonOptions(tolerance=self.deployment.tolerance), []
         start = self._model.compact(q, self.deployment.angle)
         for weight in self.deployment.weights:
@@ -117,6 +133,9 @@ class Umbrella(Design):
             system = System(scene.with_terms(actuators, *attraction))
             start = self._solved(solve, system, q, start, options, f"actuator weight {weight:g}")
             done.append(start)
+        if self.pins is not None:
+            places = q[self.mesh.lengths.size:].reshape(-1, 3)
+            start = self.pins.aligned(start.state, self.joints[self.pins.joints], places)
         final = self._solved(solve, self.systems["deployed"], q, start, NewtonOptions(), "final state")
         return {"deployed": final.after(*done)}
 
@@ -195,7 +214,7 @@ class Umbrella(Design):
     def _like(self, mesh: UmbrellaMesh, **changes: Any) -> Umbrella:
         options = {"arms": self.arms, "plates": self.plates, "arm_elements": self.arm_elements,
                    "plate_elements": self.plate_elements, "plate_model": self.plate_model,
-                   "least_length": float(self.lower.min()), "deployment": self.deployment}
+                   "least_length": self.least_length, "pins": self.pins, "deployment": self.deployment}
         return Umbrella(self.name, mesh, **(options | changes))
 
 
@@ -207,7 +226,8 @@ def umbrella_from_dict(data: Mapping[str, Any], source: str = "design") -> Umbre
         plates = Plates(**data.get("plates", {}))
         materials = {key: material_from_dict(value) for key, value in data.get("materials", {}).items()}
         target = _target(data["target"], base) if "target" in data else None
-        return Umbrella(data["name"], umbrella_mesh(base, data["lengths"], plates, target), **materials,
+        pins = pins_from_dict(data["pins"], base, target) if "pins" in data else None
+        return Umbrella(data["name"], umbrella_mesh(base, data["lengths"], plates, target), **materials, pins=pins,
                         arm_elements=_count(data, "arm_elements", 3), plate_elements=_count(data, "plate_elements", 1),
                         plate_model=data.get("plate_model", RODS), least_length=data.get("least_length"))
     except KeyError as error:

@@ -54,7 +54,7 @@ class UmbrellaScene:
     def compact(self, q: np.ndarray, angle: float) -> State:
         """The assembled mesh with arm lengths q, all hinges turned by an angle (rad) out of the upright arms."""
         initial = self.scene.initial
-        joints = self.mesh.compact_positions(q)
+        joints = self.mesh.compact_positions(q[: self.mesh.lengths.size])
         ends = joints[self.mesh.rods.joints] + self.mesh.rods.offsets
         t = self.interior_fraction[:, None]
         inside = (1 - t) * ends[self.interior_rod, 0] + t * ends[self.interior_rod, 1]
@@ -62,9 +62,12 @@ class UmbrellaScene:
                      np.full(self.scene.n_hinges, float(angle)))
 
 
-def umbrella_scene(mesh: UmbrellaMesh, model: UmbrellaModel = UmbrellaModel()) -> UmbrellaScene:
-    """Build the scene; arm rest lengths are the parameters q (2 n_cells,): top and bottom of every cell."""
-    build, bodies = SceneBuilder(2 * mesh.n_cells), joint_bodies(mesh, model.plate_model)
+def umbrella_scene(mesh: UmbrellaMesh, model: UmbrellaModel = UmbrellaModel(), n_parameters: int = 0) -> UmbrellaScene:
+    """Build the scene; arm rest lengths are the first parameters (2 n_cells,) of q: top and bottom of every cell.
+
+    n_parameters : length of q, where it goes on after the lengths
+    """
+    build, bodies = SceneBuilder(max(n_parameters, mesh.lengths.size)), joint_bodies(mesh, model.plate_model)
     build.bodies(mesh.positions[bodies.origins], mesh.frames[bodies.origins])
     hinge = np.full(len(mesh.positions), -1)
     hinged = mesh.hinged
