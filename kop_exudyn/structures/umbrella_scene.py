@@ -1,4 +1,4 @@
-"""Builds the scene of an umbrella mesh: bodies for joints or whole plates, rods between them, actuators in the cells."""
+"""Builds the scene of an umbrella mesh: bodies for joints or whole plates, rods between them, actuators in cells."""
 from __future__ import annotations
 
 from dataclasses import dataclass
