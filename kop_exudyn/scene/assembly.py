@@ -12,7 +12,7 @@ from ..rods.rotations import bend_coefficient
 ENERGY, GRADIENT, HESSIAN = 0, 1, 2
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, inline="always")
 def node_pose(xb, Rb, h, angles, axes, centres, plain, C, o, x, R, EC, y):
     """Pose (x, R) of a node behind hinge h (-1: none), with EC = E(a) C and y = p + E(a) o left for the variations.
 
@@ -30,24 +30,33 @@ def node_pose(xb, Rb, h, angles, axes, centres, plain, C, o, x, R, EC, y):
             for c in range(3):
                 EC[r, c] = C[r, c]
     else:
-        n, p = axes[h], centres[h]
+        # inlined and without views of rows: passing arrays about costs as much as the arithmetic
+        n0, n1, n2 = axes[h, 0], axes[h, 1], axes[h, 2]
+        p0, p1, p2 = centres[h, 0], centres[h, 1], centres[h, 2]
         co, si = math.cos(angles[h]), math.sin(angles[h])
-        along = (1.0 - co) * (n[0] * o[0] + n[1] * o[1] + n[2] * o[2])
-        y[0] = p[0] + co * o[0] + si * (n[1] * o[2] - n[2] * o[1]) + along * n[0]
-        y[1] = p[1] + co * o[1] + si * (n[2] * o[0] - n[0] * o[2]) + along * n[1]
-        y[2] = p[2] + co * o[2] + si * (n[0] * o[1] - n[1] * o[0]) + along * n[2]
-        for c in range(3):
-            along = (1.0 - co) * (n[0] * C[0, c] + n[1] * C[1, c] + n[2] * C[2, c])
-            EC[0, c] = co * C[0, c] + si * (n[1] * C[2, c] - n[2] * C[1, c]) + along * n[0]
-            EC[1, c] = co * C[1, c] + si * (n[2] * C[0, c] - n[0] * C[2, c]) + along * n[1]
-            EC[2, c] = co * C[2, c] + si * (n[0] * C[1, c] - n[1] * C[0, c]) + along * n[2]
+        if n2 == 1.0:  # about z: most hinges, and half the work
+            y[0], y[1], y[2] = p0 + co * o[0] - si * o[1], p1 + si * o[0] + co * o[1], p2 + o[2]
+            for c in range(3):
+                EC[0, c] = co * C[0, c] - si * C[1, c]
+                EC[1, c] = si * C[0, c] + co * C[1, c]
+                EC[2, c] = C[2, c]
+        else:
+            along = (1.0 - co) * (n0 * o[0] + n1 * o[1] + n2 * o[2])
+            y[0] = p0 + co * o[0] + si * (n1 * o[2] - n2 * o[1]) + along * n0
+            y[1] = p1 + co * o[1] + si * (n2 * o[0] - n0 * o[2]) + along * n1
+            y[2] = p2 + co * o[2] + si * (n0 * o[1] - n1 * o[0]) + along * n2
+            for c in range(3):
+                along = (1.0 - co) * (n0 * C[0, c] + n1 * C[1, c] + n2 * C[2, c])
+                EC[0, c] = co * C[0, c] + si * (n1 * C[2, c] - n2 * C[1, c]) + along * n0
+                EC[1, c] = co * C[1, c] + si * (n2 * C[0, c] - n0 * C[2, c]) + along * n1
+                EC[2, c] = co * C[2, c] + si * (n0 * C[1, c] - n1 * C[0, c]) + along * n2
     for r in range(3):
         x[r] = xb[r] + Rb[r, 0] * y[0] + Rb[r, 1] * y[1] + Rb[r, 2] * y[2]
         for c in range(3):
             R[r, c] = Rb[r, 0] * EC[0, c] + Rb[r, 1] * EC[1, c] + Rb[r, 2] * EC[2, c]
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, inline="always")
 def node_map(Rb, h, axes, centres, C, EC, y, T, d):
     """T (6,7): node increments (dx, w) from body increments and hinge angle, with d = n x (y - p) left behind.
 
@@ -65,12 +74,12 @@ def node_map(Rb, h, axes, centres, C, EC, y, T, d):
         T[3 + r, 6] = 0.0
     if h < 0:
         return
-    n, p = axes[h], centres[h]
-    a0, a1, a2 = y[0] - p[0], y[1] - p[1], y[2] - p[2]
-    d[0], d[1], d[2] = n[1] * a2 - n[2] * a1, n[2] * a0 - n[0] * a2, n[0] * a1 - n[1] * a0
+    n0, n1, n2 = axes[h, 0], axes[h, 1], axes[h, 2]
+    a0, a1, a2 = y[0] - centres[h, 0], y[1] - centres[h, 1], y[2] - centres[h, 2]
+    d[0], d[1], d[2] = n1 * a2 - n2 * a1, n2 * a0 - n0 * a2, n0 * a1 - n1 * a0
     for r in range(3):
         T[r, 6] = Rb[r, 0] * d[0] + Rb[r, 1] * d[1] + Rb[r, 2] * d[2]
-        T[3 + r, 6] = C[0, r] * n[0] + C[1, r] * n[1] + C[2, r] * n[2]
+        T[3 + r, 6] = C[0, r] * n0 + C[1, r] * n1 + C[2, r] * n2
 
 
 @nb.njit(cache=True)
@@ -128,7 +137,7 @@ def map_curvature(Rb, h, axes, EC, y, T, d, force, moment, H, at):
     H[at + 4, at + 5] += 0.5 * (f1 * y[2] + f2 * y[1])
     if h < 0:
         return
-    n = axes[h]
+    n0, n1, n2 = axes[h, 0], axes[h, 1], axes[h, 2]
     b0, b1, b2 = T[3, 6], T[4, 6], T[5, 6]
     t0 = b1 * moment[2] - b2 * moment[1]
     t1 = b2 * moment[0] - b0 * moment[2]
@@ -136,8 +145,7 @@ def map_curvature(Rb, h, axes, EC, y, T, d, force, moment, H, at):
     H[at + 3, at + 6] += d[1] * f2 - d[2] * f1 + 0.5 * (EC[0, 0] * t0 + EC[0, 1] * t1 + EC[0, 2] * t2)
     H[at + 4, at + 6] += d[2] * f0 - d[0] * f2 + 0.5 * (EC[1, 0] * t0 + EC[1, 1] * t1 + EC[1, 2] * t2)
     H[at + 5, at + 6] += d[0] * f1 - d[1] * f0 + 0.5 * (EC[2, 0] * t0 + EC[2, 1] * t1 + EC[2, 2] * t2)
-    H[at + 6, at + 6] += (f0 * (n[1] * d[2] - n[2] * d[1]) + f1 * (n[2] * d[0] - n[0] * d[2])
-                          + f2 * (n[0] * d[1] - n[1] * d[0]))
+    H[at + 6, at + 6] += f0 * (n1 * d[2] - n2 * d[1]) + f1 * (n2 * d[0] - n0 * d[2]) + f2 * (n0 * d[1] - n1 * d[0])
 
 
 @nb.njit(cache=True)
