@@ -11,7 +11,9 @@ from ..kit.parts import Assignment, Kit
 from ..optimize.objective import Evaluation, Reference
 from ..optimize.stages import StageEvent, StageResult
 from ..structures.base import Design
+from .strength import strength_summary
 
+INPUT = "input"  # the designs as given, before all stages
 STAGES = ("direct", "unrelaxed", "relaxed", "assigned")
 _SAME = 1e-3  # of the bounding box: states whose joints are this close are one
 
@@ -95,7 +97,7 @@ class KitResult:
 
 
 def summary_of(outcome: Evaluation | SimulationFailure, design: Design, reference: Reference) -> dict[str, Any]:
-    """One design's figures: fit in % of the bounding box, energies, stability, Exudyn's confirmation."""
+    """One design's figures: fit in % of the bounding box, energies, stability, Exudyn's confirmation, largest stresses."""
     if isinstance(outcome, SimulationFailure):
         return {"failed": str(outcome)}
     role = design.fitted_role.name
@@ -105,6 +107,7 @@ def summary_of(outcome: Evaluation | SimulationFailure, design: Design, referenc
         "elastic_energy": energy, "energy_ratio": energy / reference.energy,
         "stable": all(eq.stable for eq in outcome.equilibria.values()),
         "exudyn": outcome.confirmations[role].to_dict(),
+        "strength": strength_summary(design, outcome.equilibria),
     }
 
 

@@ -13,6 +13,7 @@ from ..equilibrium.warm_up import warm_up
 from ..errors import SimulationFailure
 from ..optimize.fitting import FitResult, TargetFitting
 from ..structures.base import Design
+from .strength import strength_summary
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,7 @@ class SimulationResult:
             "elastic_energy": final.elastic_energy, "stable": final.stable, "opening_angle": final.opening,
             "exudyn": self.confirmations[self.design.fitted_role.name].to_dict(),
             "fit": {"max_percent": self.fit.max_percent, "mean_percent": self.fit.mean_percent},
+            "strength": strength_summary(self.design, self.equilibria),
             "joints": self.joints.tolist(),
         }
 

@@ -84,6 +84,11 @@ def design_strength(design: Design, equilibria: Mapping[str, Equilibrium]) -> di
     return {role: rod_strength(design.scene(role), equilibrium, materials) for role, equilibrium in equilibria.items()}
 
 
+def strength_summary(design: Design, equilibria: Mapping[str, Equilibrium]) -> dict[str, dict[str, Any]]:
+    """`Strength.to_dict()` by role, as results have it."""
+    return {role: strength.to_dict() for role, strength in design_strength(design, equilibria).items()}
+
+
 def materials_of(design: Design) -> tuple[Material, ...]:
     """Materials among a design's attributes, and among the fields of the dataclasses there, in a fixed order."""
     return tuple(dict.fromkeys(_materials_in(vars(design).values(), depth=1)))

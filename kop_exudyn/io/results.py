@@ -6,6 +6,7 @@ from typing import Any, Mapping
 
 import numpy as np
 
+from ..equilibrium.newton import Equilibrium
 from ..errors import InputError
 from .arrays import load_arrays, save_arrays
 from .documents import check_envelope, check_schema
@@ -35,18 +36,27 @@ def load_result(path: str | Path) -> dict[str, Any]:
     return data
 
 
-def save_states(path: str | Path, states: Mapping[tuple[str, str, str], Any], *, overwrite: bool = False) -> Path:
-    """Write final states as one .npz file: entries ``DESIGN/STAGE/ROLE/positions``, ``.../rotations``, ``.../angles``.
+def save_states(path: str | Path, found: Mapping[tuple[str, str, str], Equilibrium], *,
+                overwrite: bool = False) -> Path:
+    """Write states as one .npz file: entries ``DESIGN/STAGE/ROLE/positions``, ``.../rotations``, ``.../angles``,
+    ``.../parameters`` (q) and ``.../torque`` (the actuation's multiplier, one number).
 
-    states : (design, stage, role) -> `State`
+    found : (design, stage, role) -> equilibrium
     """
-    arrays = {"/".join([*key, field]): getattr(state, field)
-              for key, state in states.items() for field in ("positions", "rotations", "angles")}
+    arrays = {}
+    for key, equilibrium in found.items():
+        state = equilibrium.state
+        values = {"positions": state.positions, "rotations": state.rotations, "angles": state.angles,
+                  "parameters": equilibrium.q, "torque": np.array(equilibrium.torque)}
+        arrays |= {"/".join([*key, field]): array for field, array in values.items()}
     return save_arrays(path, arrays, overwrite=overwrite)
 
 
 def load_states(path: str | Path) -> dict[tuple[str, str, str], dict[str, np.ndarray]]:
-    """What `save_states` wrote: (design, stage, role) -> {"positions", "rotations", "angles"}."""
+    """What `save_states` wrote: (design, stage, role) -> {"positions", "rotations", "angles", "parameters", "torque"}.
+
+    Files of earlier versions lack the last two.
+    """
     found: dict[tuple[str, str, str], dict[str, np.ndarray]] = {}
     for name, array in load_arrays(path).items():
         *key, field = name.split("/")

@@ -6,14 +6,14 @@ from typing import Any, Mapping, Sequence
 
 import numpy as np
 
-from ..analysis.kit_result import STAGES, KitResult
-from ..equilibrium.newton import solve
+from ..analysis.kit_result import INPUT, STAGES, KitResult
+from ..equilibrium.newton import Equilibrium, Start, solve
 from ..errors import InputError, SimulationFailure
 from ..kit.parts import Assignment, Kit
 from ..optimize.objective import DesignObjective, Evaluation, Reference, reference_of
 from ..optimize.stages import StageResult
 from ..scene.state import State
-from ..structures.base import Design
+from ..structures.base import Design, Role
 from .results import load_result, load_states
 
 _LAST = "assigned"
@@ -24,8 +24,9 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
     """A run's result, from result.json and states.npz in its folder and the designs that it was made for.
 
     designs : those of the run, in any order; there may be others among them
-    The input designs are simulated again; saved states are solved for once more, from where they are, and confirmed by
-    Exudyn. The assigned stage is always there; earlier ones are where states.npz has their parameters.
+    Saved states are checked by a solve that starts from them, and confirmed by Exudyn. Folders of earlier versions have
+    neither the input designs' states, which are then simulated again, nor the parameters of stages before the last one,
+    which are then left out.
 
     Raises InputError when the files are damaged or belong to other designs, SimulationFailure when an input design
     can't be simulated.
@@ -39,7 +40,7 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
     groups = [group.shifted(start) for design, start in zip(designs, offsets) for group in design.groups]
     assignment = Assignment.from_dict(data["assignment"], groups, int(offsets[-1]), kit, source=str(path))
     realised = np.split(assignment.matrix(kit) @ kit.vector, offsets[1:-1])
-    references = [reference_of(design) for design in designs]
+    references = [_reference(design, states) for design in designs]
     result = KitResult(list(designs), references, {}, settings=data["settings"], equilibria=data["equilibria"],
                        newton_iterations=data["newton_iterations"], wall_s=data["wall_s"],
                        peak_memory_mb=data["peak_memory_mb"])
@@ -73,15 +74,29 @@ def _outcome(design: Design, reference: Reference, stage: str, states: Mapping[t
     q = next(iter(saved.values())).get("parameters", q)
     if q is None:
         return None
-    equilibria = {}
-    for role in design.roles:
-        state = State(*(saved[role.name][field] for field in ("positions", "rotations", "angles")))
-        scene = design.scene(role.name)
-        if (len(state.positions), len(state.angles)) != (scene.n_bodies, scene.n_hinges):
-            raise InputError("the saved states are of another version of this design", source=design.name, field=stage)
-        found = solve(design.systems[role.name], q, state, role.opening)
-        if np.abs(found.state.positions - state.positions).max() > _SAME_PLACE * scene.size:
-            raise InputError("the saved states are no equilibria of this design", source=design.name, field=stage)
-        equilibria[role.name] = found
+    equilibria = {role.name: _equilibrium(design, role, stage, q, saved[role.name]) for role in design.roles}
     objective = DesignObjective(design, reference=reference)
     return objective.confirm(objective.judge(q, equilibria))
+
+
+def _reference(design: Design, states: Mapping[tuple[str, str, str], Any]) -> Reference:
+    """The input design's equilibria, from their saved states where these are there."""
+    saved = {role.name: states.get((design.name, INPUT, role.name)) for role in design.roles}
+    if None in saved.values():
+        return reference_of(design)
+    equilibria = {role.name: _equilibrium(design, role, INPUT, design.parameters, saved[role.name])
+                  for role in design.roles}
+    return Reference(design.target, equilibria[design.fitted_role.name].elastic_energy, equilibria)
+
+
+def _equilibrium(design: Design, role: Role, stage: str, q: np.ndarray, saved: Mapping[str, np.ndarray]) -> Equilibrium:
+    """The equilibrium that a saved state is; InputError where it is none of this design."""
+    state = State(*(saved[field] for field in ("positions", "rotations", "angles")))
+    scene = design.scene(role.name)
+    sizes = (scene.n_bodies, scene.n_hinges, len(design.parameters))
+    if (len(state.positions), len(state.angles), len(q)) != sizes:
+        raise InputError("the saved states are of another version of this design", source=design.name, field=stage)
+    found = solve(design.systems[role.name], q, Start(state, float(saved.get("torque", 0.0))), role.opening)
+    if np.abs(found.state.positions - state.positions).max() > _SAME_PLACE * scene.size:
+        raise InputError("the saved states are no equilibria of this design", source=design.name, field=stage)
+    return found

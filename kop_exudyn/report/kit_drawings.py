@@ -5,7 +5,8 @@ from typing import Mapping, Sequence
 
 import numpy as np
 
-from ..analysis.kit_result import STAGES, KitResult
+from ..analysis.kit_result import INPUT, STAGES, KitResult
+from ..equilibrium.newton import Equilibrium
 from ..errors import SimulationFailure
 from ..kit.kinds import part_kind
 from ..optimize.objective import Evaluation
@@ -87,20 +88,22 @@ def summary_rows(result: KitResult) -> tuple[list[str], list[list]]:
     """Headings and rows of the table of all designs: deviations after every stage, then figures of the assigned one."""
     stages = [stage for stage in STAGES if stage in result.stages]
     headings = ["design", "elements", *(f"{stage}, max %" for stage in stages), "assigned, mean %", "energy ratio",
-                "stable"]
+                "largest stress", "utilisation", "stable"]
     rows = []
     for n, design in enumerate(result.designs):
         found = {stage: result.summary(stage, n) for stage in stages}
         final = found["assigned"]
         largest = [_fit(found[stage], "max_percent") for stage in stages]
         rows.append([design.name, design.n_elements, *largest, _fit(final, "mean_percent"), final.get("energy_ratio"),
-                     final.get("stable")])
+                     _worst(final, "equivalent_stress"), _worst(final, "utilisation"), final.get("stable")])
     return headings, rows
 
 
-def final_states(result: KitResult) -> dict[tuple[str, str, str], object]:
-    """(design, stage, role) -> state, for all that were found."""
-    return {(design.name, stage, role): equilibrium.state
+def final_states(result: KitResult) -> dict[tuple[str, str, str], Equilibrium]:
+    """(design, stage, role) -> equilibrium, for all that were found; the designs as given are stage "input"."""
+    inputs = {(design.name, INPUT, role): equilibrium for design, reference in zip(result.designs, result.references)
+              for role, equilibrium in reference.equilibria.items()}
+    return inputs | {(design.name, stage, role): equilibrium
             for stage, found in result.stages.items() for design, outcome in zip(result.designs, found.designs)
             if isinstance(outcome, Evaluation) for role, equilibrium in outcome.equilibria.items()}
 
@@ -131,3 +134,9 @@ def _about_opening(name: str, opened: Mapping, kept: Mapping) -> str:
 
 def _fit(summary: Mapping, name: str) -> float | None:
     return summary["fit"][name] if "fit" in summary else None
+
+
+def _worst(summary: Mapping, name: str) -> float | None:
+    """The largest stress or utilisation of all states."""
+    known = [strength[name] for strength in summary.get("strength", {}).values() if strength[name] is not None]
+    return max(known, default=None)

@@ -4,6 +4,7 @@ import json
 import numpy as np
 import pytest
 
+from kop_exudyn.equilibrium.newton import Equilibrium
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.arrays import load_arrays
 from kop_exudyn.io.results import load_result, load_states, save_result, save_states
@@ -51,11 +52,14 @@ def test_other_formats_are_told_apart(write_json_file):
 def test_states_round_trip(tmp_path):
     generator = np.random.default_rng(1)
     state = State(generator.random((3, 3)), generator.random((3, 3, 3)), generator.random(2))
-    found = load_states(save_states(tmp_path / "states.npz", {("a shape", "assigned", "deployed"): state}))
+    equilibrium = Equilibrium(state, generator.random(4), 0.5, 0.25, generator.random((2, 6)), 1.0, 1.0, 3, 1e-12, 0, 0.1)
+    found = load_states(save_states(tmp_path / "states.npz", {("a shape", "assigned", "deployed"): equilibrium}))
     arrays = found["a shape", "assigned", "deployed"]
-    assert sorted(arrays) == ["angles", "positions", "rotations"]
-    for name, array in arrays.items():
-        np.testing.assert_array_equal(array, getattr(state, name))
+    assert sorted(arrays) == ["angles", "parameters", "positions", "rotations", "torque"]
+    for name in ("angles", "positions", "rotations"):
+        np.testing.assert_array_equal(arrays[name], getattr(state, name))
+    np.testing.assert_array_equal(arrays["parameters"], equilibrium.q)
+    assert arrays["torque"] == 0.25
 
 
 def test_pickled_arrays_are_refused(tmp_path):

@@ -2,12 +2,14 @@
 import numpy as np
 import pytest
 
-from kop_exudyn.analysis.kit_result import KitResult
+from kop_exudyn.analysis.kit_result import STAGES, KitResult
 from kop_exudyn.errors import InputError
-from kop_exudyn.io.results import save_result, save_states
+from kop_exudyn.io.arrays import load_arrays, save_arrays
+from kop_exudyn.io.results import load_result, save_result, save_states
 from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.optimize.job import JobSettings, run_job
 from kop_exudyn.optimize.stages import StageSettings
+from kop_exudyn.report.kit_drawings import final_states, summary_rows
 
 
 @pytest.fixture(scope="module")
@@ -17,9 +19,7 @@ def finished(shells, tmp_path_factory):
     outcome = run_job(shells, {"linear": 3, "angular": 2}, JobSettings(jobs=1, baselines=False, stages=stages))
     result = KitResult(shells, outcome.references, outcome.stages)
     save_result(folder / "result.json", result.to_dict())
-    save_states(folder / "states.npz", {
-        (design.name, stage, role): eq.state for stage, found in result.stages.items()
-        for design, outcome in zip(shells, found.designs) for role, eq in outcome.equilibria.items()})
+    save_states(folder / "states.npz", final_states(result))
     return result, folder
 
 
@@ -34,6 +34,48 @@ def test_what_was_written_is_read(finished, shells):
             scale = np.abs(b.equilibria["deployed"].stress).max(axis=0)
             assert (np.abs(a.equilibria[role].stress - b.equilibria[role].stress).max(axis=0) <= 1e-6 * scale).all()
     assert again.to_dict()["designs"][0]["assigned"]["exudyn"]["moved"] < 1e-8
+
+
+def test_all_stages_come_back(finished, shells, monkeypatch):
+    """Nothing is deployed anew for them."""
+    result, folder = finished
+    for design in shells:
+        monkeypatch.setattr(design, "deploy", None)
+    again = load_run(folder, shells)
+    assert list(again.stages) == [stage for stage in STAGES if stage in result.stages] == ["direct", "relaxed", "assigned"]
+    for stage, found in result.stages.items():
+        for a, b in zip(again.stages[stage].designs, found.designs):
+            np.testing.assert_array_equal(a.q, b.q)
+            assert a.value == pytest.approx(b.value, rel=1e-9)
+    for a, b in zip(again.references, result.references):
+        assert a.energy == pytest.approx(b.energy, rel=1e-9)
+        assert a.equilibria["deployed"].torque == pytest.approx(b.equilibria["deployed"].torque, rel=1e-6)
+
+
+def test_strength_is_in_every_stage(finished):
+    result, folder = finished
+    for entry in load_result(folder / "result.json")["designs"]:
+        for stage in ("direct", "relaxed", "assigned"):
+            assert set(entry[stage]["strength"]) == {"deployed", "rest"}
+            for figures in entry[stage]["strength"].values():
+                assert figures["utilisation"] == pytest.approx(figures["equivalent_stress"] / 4e7)
+                assert 0 < figures["utilisation"] < 5
+    headings, rows = summary_rows(result)
+    largest = max(s["utilisation"] for s in result.summary("assigned", 0)["strength"].values())
+    assert rows[0][headings.index("utilisation")] == largest
+
+
+def test_folders_of_earlier_versions(finished, shells, tmp_path):
+    """They have neither parameters nor input states: the last stage is there, the input is simulated again."""
+    result, folder = finished
+    old = {name: array for name, array in load_arrays(folder / "states.npz").items()
+           if name.split("/")[1] != "input" and name.split("/")[3] not in ("parameters", "torque")}
+    save_arrays(tmp_path / "states.npz", old)
+    (tmp_path / "result.json").write_bytes((folder / "result.json").read_bytes())
+    again = load_run(tmp_path, shells)
+    assert list(again.stages) == ["assigned"]
+    assert again.stages["assigned"].value == result.stages["assigned"].value
+    assert again.references[0].energy == pytest.approx(result.references[0].energy, rel=1e-9)
 
 
 def test_designs_are_found_by_name(finished, shells):

@@ -104,6 +104,8 @@ def test_result_file(finished):
     assert (len(data["kit"]["linear"]), len(data["kit"]["angular"])) == (3, 2)
     assert data["settings"]["parts"] == {"linear": 3, "angular": 2}
     assert data["peak_memory_mb"] > 0
+    strength = data["designs"][0]["assigned"]["strength"]
+    assert strength == {"deployed": {"equivalent_stress": None, "utilisation": None, "element": None}}  # no sections
 
 
 def test_drawings_show_the_result(finished):
