@@ -41,7 +41,7 @@ def optimize_kit(
     """
     begin = perf_counter()
     _check_request(designs, parts, settings)
-    described = _described(designs, parts, settings)
+    described = described_job(designs, parts, settings)
     job = described if inputs else described | {"parameters": {d.name: _digest(d.parameters) for d in designs}}
     folder = RunFolder.open(out, Job.of(job, inputs), resume=resume, overwrite=overwrite)
     events: list[StageEvent] = []
@@ -71,7 +71,7 @@ def _check_request(designs: Sequence[Design], parts: Mapping[str, int], settings
     cluster(groups, q, parts, bounds=settings.stages.bounds, restarts=1)
 
 
-def _described(designs: Sequence[Design], parts: Mapping[str, int], settings: JobSettings) -> dict[str, Any]:
+def described_job(designs: Sequence[Design], parts: Mapping[str, int], settings: JobSettings) -> dict[str, Any]:
     """All that the result depends on, as plain data; the number of processes is not part of it."""
     constraints = settings.stages.constraints
     values = asdict(replace(settings, stages=replace(settings.stages, constraints=None)))
