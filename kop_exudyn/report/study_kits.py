@@ -1,0 +1,66 @@
+"""The kits that several studies look at: one of each class, computed once and kept beside the reports."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Mapping
+
+from ..analysis.kit_result import KitResult
+from ..errors import InputError
+from ..io.checkpoint import Job
+from ..io.designs import load_designs, select_files
+from ..io.saved_runs import load_run
+from ..optimize.job import JobSettings
+from ..optimize.stages import StageSettings
+from .kit_run import described_job, optimize_kit
+
+QUICK_STAGES = StageSettings(schedule=None, relaxed_steps=1, assigned_steps=1, round_steps=1, reassignments=0,
+                             path_steps=2, rescues=0, restarts=2)
+
+
+@dataclass(frozen=True)
+class KitCase:
+    """What a kit is asked for.
+
+    name : of the class, as a reader knows it
+    folder : of design files; number : of them, in order of their names (None: all)
+    parts : kind -> number of parts
+    """
+
+    name: str
+    folder: Path
+    number: int | None
+    parts: Mapping[str, int]
+    stages: StageSettings = StageSettings()
+
+    @property
+    def files(self) -> list[Path]:
+        return select_files(self.folder, self.number)
+
+
+def three_classes(models: Path, quick: bool = False) -> list[KitCase]:
+    """C-shells, grids and umbrella meshes of the repository's models; quick: one design each and hardly any steps."""
+    stages = QUICK_STAGES if quick else StageSettings()
+    beams = {"linear": 12, "angular": 5}
+    return [KitCase("C-shells", models / "conformals", 1 if quick else 3, beams, stages),
+            KitCase("grids", models / "grids", 1 if quick else None, beams, stages),
+            KitCase("umbrella meshes", models / "umbrellas", 1 if quick else None, {"cells": 8}, stages)]
+
+
+def kit_of(case: KitCase, runs: Path, jobs: int) -> KitResult:
+    """The kit of a case: a finished run of the same job in `runs`, or a new run, which goes on from checkpoints there.
+
+    A run that was read back has no events. Raises InputError and SimulationFailure as `optimize_kit` does.
+    """
+    designs, files, settings = load_designs(case.folder, case.number), case.files, JobSettings(stages=case.stages, jobs=jobs)
+    folder = runs / case.name.replace(" ", "_")
+    record = folder / "checkpoints" / "job.json"
+    job = Job.of(described_job(designs, case.parts, settings), files)
+    same = record.exists() and Job.load(record).difference(job) is None
+    if same and (folder / "result.json").exists():
+        try:
+            return load_run(folder, designs)
+        except InputError:  # a result of an earlier version: computed anew
+            same = False
+    (folder / "result.json").unlink(missing_ok=True)
+    return optimize_kit(designs, case.parts, out=folder, settings=settings, inputs=files, resume=same, overwrite=True)
