@@ -44,7 +44,7 @@ def three_classes(models: Path, quick: bool = False) -> list[KitCase]:
     beams = {"linear": 12, "angular": 5}
     return [KitCase("C-shells", models / "conformals", 1 if quick else 3, beams, stages),
             KitCase("grids", models / "grids", 1 if quick else None, beams, stages),
-            KitCase("umbrella meshes", models / "umbrellas", 1 if quick else None, {"cells": 8}, stages)]
+            KitCase("umbrella meshes", models / "umbrellas", 1 if quick else None, {"cell": 8}, stages)]
 
 
 def kit_of(case: KitCase, runs: Path, jobs: int) -> KitResult:

@@ -1,0 +1,153 @@
+"""Fabrication errors: how far a design moves when its elements aren't exactly as long, or as angled, as planned.
+
+To first order the joints' displacement is J dq with J = dx/dq, seen after the best rigid placement (an error that only
+turns the whole design is none). Independent errors of standard deviation s_k then give joints of covariance
+P J diag(s^2) J^T P^T, with P the projection off infinitesimal rigid motions. Sampling solves the equilibria instead.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Mapping
+
+import numpy as np
+
+from ..equilibrium.sensitivities import Sensitivities
+from ..errors import InputError, SimulationFailure
+from ..kit.kinds import part_kind
+from ..optimize.fitting import best_placement
+from ..optimize.objective import DesignObjective, Evaluation
+from ..structures.base import Design
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Standard deviations of fabrication errors, independent from element to element.
+
+    length : in the design's unit
+    angle : rad
+    """
+
+    length: float
+    angle: float
+
+    def __post_init__(self) -> None:
+        for name in ("length", "angle"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
+                raise InputError("must be a number that is not negative", field=name, value=getattr(self, name))
+
+    def scaled(self, factor: float) -> Tolerance:
+        return Tolerance(factor * self.length, factor * self.angle)
+
+    def deviations(self, design: Design) -> np.ndarray:
+        """(nq,) standard deviation of every parameter; 0 for those that belong to no element."""
+        found = np.zeros(len(design.parameters))
+        for group in design.groups:
+            found[group.indices] = self.angle if part_kind(group.kind).angular else self.length
+        return found
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Displacements of the joints by fabrication errors, rigid motions taken out.
+
+    joints : (n,) root mean square displacement of every joint, length
+    diagonal : of the target's bounding box, length
+    """
+
+    joints: np.ndarray
+    diagonal: float
+
+    @property
+    def rms_percent(self) -> float:
+        """Root mean square over all joints, % of the bounding-box diagonal."""
+        return 100 * float(np.sqrt(np.mean(self.joints**2))) / self.diagonal
+
+    @property
+    def worst_percent(self) -> float:
+        """Of the joint that moves most, % of the bounding-box diagonal."""
+        return 100 * float(self.joints.max()) / self.diagonal
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One set of errors, and what came of it: the joints' displacements (n, 3), or why no equilibrium was found."""
+
+    errors: np.ndarray
+    displacements: np.ndarray | None
+    max_percent: float | None
+    failed: str | None = None
+
+
+def joint_jacobian(design: Design, evaluation: Evaluation) -> np.ndarray:
+    """(3n, nq) derivative of the fitted state's joints in the parameters, rigid motions taken out."""
+    role = design.fitted_role.name
+    equilibrium = evaluation.equilibria[role]
+    J = Sensitivities(design.systems[role], equilibrium).positions(design.joints)
+    motions = _rigid_motions(equilibrium.state.positions[design.joints])
+    return J - motions @ (motions.T @ J)
+
+
+def predicted_spread(design: Design, evaluation: Evaluation, tolerance: Tolerance) -> Spread:
+    """The joints' displacements to first order: no equilibrium is solved."""
+    rows = joint_jacobian(design, evaluation) * tolerance.deviations(design)
+    variance = np.sum(rows.reshape(-1, 3, rows.shape[1])**2, axis=(1, 2))
+    return Spread(np.sqrt(variance), evaluation.fit.diagonal)
+
+
+def shares_by_kind(design: Design, evaluation: Evaluation, tolerance: Tolerance) -> Mapping[str, float]:
+    """kind -> its share of the joints' mean square displacement, to first order; they sum to one."""
+    rows = joint_jacobian(design, evaluation) * tolerance.deviations(design)
+    by_parameter = np.sum(rows**2, axis=0)
+    total = by_parameter.sum()
+    found: dict[str, float] = {}
+    for group in design.groups:
+        share = float(by_parameter[group.indices].sum() / total) if total else 0.0
+        found[group.kind] = found.get(group.kind, 0.0) + share
+    return found
+
+
+def sample_spread(design: Design, evaluation: Evaluation, tolerance: Tolerance, number: int, seed: int = 0,
+                  ) -> list[Sample]:
+    """Re-solved equilibria for `number` sets of normally distributed errors; the same errors for the same seed.
+
+    A set for which no equilibrium is found is a sample with its reason.
+    """
+    generator, deviations = np.random.default_rng(seed), tolerance.deviations(design)
+    role = design.fitted_role.name
+    objective = DesignObjective(design)
+    wanted = evaluation.equilibria[role].state.positions[design.joints]
+    samples = []
+    for _ in range(number):
+        errors = deviations * generator.standard_normal(len(deviations))
+        try:
+            found = objective.evaluate(evaluation.q + errors, evaluation)
+        except SimulationFailure as failure:
+            samples.append(Sample(errors, None, None, str(failure)))
+            continue
+        joints = found.equilibria[role].state.positions[design.joints]
+        moved = best_placement(joints, wanted, np.full(len(joints), 1 / len(joints))).apply(joints) - wanted
+        samples.append(Sample(errors, moved, found.fit.max_percent))
+    return samples
+
+
+def sampled_spread(samples: list[Sample], diagonal: float) -> Spread:
+    """Root mean square displacements over the samples that were found. Raises SimulationFailure when none was."""
+    found = [sample.displacements for sample in samples if sample.displacements is not None]
+    if not found:
+        raise SimulationFailure("no equilibrium was found for any sample of fabrication errors")
+    return Spread(np.sqrt(np.mean(np.sum(np.square(found), axis=2), axis=0)), diagonal)
+
+
+def predicted_displacements(design: Design, evaluation: Evaluation, samples: list[Sample]) -> np.ndarray:
+    """(number, n, 3) first-order displacements for the samples' own errors: the sampling's noise is in both."""
+    J = joint_jacobian(design, evaluation)
+    return np.stack([(J @ sample.errors).reshape(-1, 3) for sample in samples])
+
+
+def _rigid_motions(x: np.ndarray) -> np.ndarray:
+    """(3n, r) orthonormal basis of the infinitesimal rigid motions of points (n, 3); collinear points have fewer."""
+    arms = x - x.mean(axis=0)
+    size = np.abs(arms).max() or 1.0
+    columns = [np.tile(axis, (len(x), 1)) for axis in np.eye(3)] + [np.cross(axis, arms / size) for axis in np.eye(3)]
+    u, s, _ = np.linalg.svd(np.stack([c.ravel() for c in columns], axis=1), full_matrices=False)
+    return u[:, s > 1e-9 * s[0]]

@@ -1,0 +1,78 @@
+"""Fabrication errors: sensitivities against re-solved equilibria, on a C-shell of four by four rods."""
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kop_exudyn.analysis.tolerance import (
+    Tolerance, joint_jacobian, predicted_displacements, predicted_spread, sample_spread, sampled_spread,
+    shares_by_kind)
+from kop_exudyn.errors import InputError, SimulationFailure
+from kop_exudyn.optimize.objective import DesignObjective
+from kop_exudyn.structures.base import design_from_dict
+
+SMALL = Tolerance(length=1e-4, angle=1e-4)  # of spans of 1
+
+
+@pytest.fixture(scope="module")
+def built():
+    lines = [[[-0.2, y], [2.2, y]] for y in (0.0, 1.0, 2.0)] + [[[x, -0.2], [x, 2.2]] for x in (0.0, 1.0, 2.0)]
+    design = design_from_dict({
+        "format": "kop_exudyn/design", "version": 1, "class": "c_shell", "name": "grid",
+        "material": {"young": 2100.0, "poisson": 0.35},
+        "section": {"type": "rectangle", "width": 0.02, "height": 0.01},
+        "curves": [{"type": "polyline", "points": points} for points in lines],
+        "crossings": "find", "free_ends": False, "rod_offset": 0.0,
+        "opening": {"angle": 0.6, "side": "up"}, "elements_per_piece": 2})
+    objective = DesignObjective(design)
+    return design, objective.judge(design.parameters, dict(objective.reference.equilibria))
+
+
+def test_small_errors_agree_with_the_sensitivities(built):
+    design, evaluation = built
+    samples = sample_spread(design, evaluation, SMALL, 12, seed=3)
+    moved = np.stack([sample.displacements for sample in samples])
+    difference = np.abs(moved - predicted_displacements(design, evaluation, samples)).max()
+    assert difference < 0.02 * np.abs(moved).max()
+    first_order = predicted_spread(design, evaluation, SMALL)
+    sampled = sampled_spread(samples, evaluation.fit.diagonal)
+    assert sampled.rms_percent == pytest.approx(first_order.rms_percent, rel=0.35)  # a dozen samples' own spread
+
+
+def test_the_linear_prediction_is_second_order_accurate(built):
+    design, evaluation = built
+
+    def error(factor):
+        samples = sample_spread(design, evaluation, SMALL.scaled(factor), 3, seed=1)
+        moved = np.stack([sample.displacements for sample in samples])
+        return np.abs(moved - predicted_displacements(design, evaluation, samples)).max()
+
+    assert 3.0 < error(16) / error(8) < 5.0
+
+
+def test_spread_is_linear_in_the_tolerance_and_shared_by_kind(built):
+    design, evaluation = built
+    once, twice = (predicted_spread(design, evaluation, SMALL.scaled(k)) for k in (1, 2))
+    assert np.allclose(twice.joints, 2 * once.joints) and once.worst_percent >= once.rms_percent > 0
+    shares = shares_by_kind(design, evaluation, SMALL)
+    assert set(shares) == {group.kind for group in design.groups} and sum(shares.values()) == pytest.approx(1)
+    assert shares_by_kind(design, evaluation, replace(SMALL, angle=0))["linear"] == pytest.approx(1)
+
+
+def test_rigid_motions_are_no_displacement(built):
+    design, evaluation = built
+    J = joint_jacobian(design, evaluation)
+    assert np.abs(J.reshape(-1, 3, J.shape[1]).sum(axis=0)).max() < 1e-9 * np.abs(J).max()
+
+
+def test_failures_are_samples(built):
+    design, evaluation = built
+    samples = sample_spread(design, evaluation, Tolerance(length=5.0, angle=0.0), 2)
+    assert all(sample.failed and sample.displacements is None for sample in samples)
+    with pytest.raises(SimulationFailure):
+        sampled_spread(samples, 1.0)
+
+
+def test_bad_tolerances_are_named():
+    with pytest.raises(InputError, match="length"):
+        Tolerance(length=-1.0, angle=0.0)
