@@ -21,10 +21,15 @@ DRAWN_STAGES = ("direct", "relaxed", "assigned")
 
 def drawn_designs(result: KitResult) -> list[DrawnDesign]:
     """Every design after the drawn stages, placed on its target, over the input design's rods."""
+    return drawn_stages(result, DRAWN_STAGES)
+
+
+def drawn_stages(result: KitResult, stages: Sequence[str]) -> list[DrawnDesign]:
+    """The same for the stages asked for, where the result has them."""
     drawn = []
     for n, (design, reference) in enumerate(zip(result.designs, result.references)):
         states = [drawn_state(design, result.stages[stage].designs[n], stage)
-                  for stage in DRAWN_STAGES if stage in result.stages]
+                  for stage in stages if stage in result.stages]
         role = design.fitted_role.name
         wanted = design.scene(role).polylines(reference.equilibria[role].state)
         drawn.append(DrawnDesign(design.name, states, wanted))

@@ -13,8 +13,9 @@ from ..io.saved_runs import load_run
 from ..optimize.job import JobSettings
 from ..optimize.stages import StageSettings
 from .kit_run import described_job, optimize_kit
+from .study import Study
 
-QUICK_STAGES = StageSettings(schedule=None, relaxed_steps=1, assigned_steps=1, round_steps=1, reassignments=0,
+QUICK_STAGES = StageSettings(relaxed_steps=1, assigned_steps=1, round_steps=1, reassignments=0,
                              path_steps=2, rescues=0, restarts=2)
 
 
@@ -47,12 +48,19 @@ def three_classes(models: Path, quick: bool = False) -> list[KitCase]:
             KitCase("umbrella meshes", models / "umbrellas", 1 if quick else None, {"cell": 8}, stages)]
 
 
+def kits(study: Study, models: Path) -> dict[str, KitResult]:
+    """The kits of the three classes by name; quick studies keep their runs in their own folder."""
+    runs = study.out / "runs" if study.quick else study.out.parent / "runs"
+    return {case.name: kit_of(case, runs, study.jobs) for case in three_classes(models, study.quick)}
+
+
 def kit_of(case: KitCase, runs: Path, jobs: int) -> KitResult:
     """The kit of a case: a finished run of the same job in `runs`, or a new run, which goes on from checkpoints there.
 
     A run that was read back has no events. Raises InputError and SimulationFailure as `optimize_kit` does.
     """
-    designs, files, settings = load_designs(case.folder, case.number), case.files, JobSettings(stages=case.stages, jobs=jobs)
+    designs, files = load_designs(case.folder, case.number), case.files
+    settings = JobSettings(stages=case.stages, jobs=jobs)
     folder = runs / case.name.replace(" ", "_")
     record = folder / "checkpoints" / "job.json"
     job = Job.of(described_job(designs, case.parts, settings), files)
