@@ -9,13 +9,12 @@ import numpy as np
 from ..errors import SimulationFailure
 from ..kit.parts import Assignment, Kit
 from ..optimize.objective import Evaluation, Reference
-from ..optimize.stages import StageEvent, StageResult
+from ..optimize.stages import SAME_STATE, StageEvent, StageResult, distance
 from ..structures.base import Design
 from .strength import strength_summary
 
 INPUT = "input"  # the designs as given, before all stages
 STAGES = ("direct", "unrelaxed", "relaxed", "assigned")
-_SAME = 1e-3  # of the bounding box: states whose joints are this close are one
 
 
 @dataclass
@@ -65,12 +64,10 @@ class KitResult:
             if isinstance(outcome, SimulationFailure):
                 return {"failed": str(outcome)}
         role = self.designs[number].fitted_role.name
-        joints = [outcome.fit.placement.apply(outcome.equilibria[role].state.positions[self.designs[number].joints])
-                  for outcome in (opened, kept)]
-        moved = float(np.linalg.norm(joints[0] - joints[1], axis=1).max()) / opened.fit.diagonal
+        moved = distance(self.designs[number], opened, kept)
         energy = opened.equilibria[role].elastic_energy
         return {
-            "same_state": moved <= _SAME, "moved_percent": 100 * moved,
+            "same_state": moved <= SAME_STATE, "moved_percent": 100 * moved,
             "fit": {"max_percent": opened.fit.max_percent, "mean_percent": opened.fit.mean_percent},
             "elastic_energy": energy, "energy_ratio": energy / self.references[number].energy,
         }

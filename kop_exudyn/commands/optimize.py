@@ -32,6 +32,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=not_negative, default=0, metavar="N", help="of the clustering (default: 0)")
     parser.add_argument("--max-steps", type=positive, metavar="N",
                         help="accepted steps at most, in each round of either stage")
+    parser.add_argument("--redeployments", type=not_negative, default=0, metavar="N",
+                        help="how often the designs are then opened from their assembly and the second stage goes on "
+                        "from where they end, so that they open into their shape by themselves (default: 0)")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -44,9 +47,10 @@ def run(args: argparse.Namespace) -> int:
     from ..report.kit_run import optimize_kit
 
     parts = {_singular(kind): count for kind, count in args.parts.items()}
-    stages = StageSettings(seed=args.seed)
+    stages = StageSettings(seed=args.seed, redeployments=args.redeployments)
     if args.max_steps is not None:
-        stages = replace(stages, relaxed_steps=args.max_steps, assigned_steps=args.max_steps)
+        stages = replace(stages, relaxed_steps=args.max_steps, assigned_steps=args.max_steps,
+                         round_steps=args.max_steps)
     result = optimize_kit(
         load_designs(args.folder, args.designs), parts, out=args.out,
         settings=JobSettings(stages=stages, jobs=args.jobs or usable_cores()),

@@ -10,7 +10,7 @@ from ..structures.base import Design
 from .dataset import Dataset
 from .objective import Evaluation, Reference, Weights
 from .pool import DesignPool
-from .rounds import in_rounds
+from .rounds import in_rounds, that_open
 from .stages import Observer, StageResult, Stages, StageSettings, Store
 
 
@@ -84,6 +84,8 @@ def run_job(
         announce("assigned stage")
         found["assigned"] = in_rounds(stages, at_parts, fixed_kit=kit is not None)
         announce("deployment of the assigned designs")
+        if settings.stages.redeployments:
+            found["assigned"] = that_open(stages, found["assigned"], fixed_kit=kit is not None)
         outcome.redeployed = stages.redeployed(found["assigned"])
         outcome.peak_memory_mb = pool.peak_memory_mb()
         outcome.equilibria, outcome.newton_iterations = dataset.tally.equilibria, dataset.tally.newton_iterations

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import SimulationFailure
 from .objective import DesignDerivatives, Evaluation
 from .reassign import LocalModel, Reassignment, reassign
-from .stages import StageResult, Stages, mixed
+from .stages import SAME_STATE, StageResult, Stages, distance, mixed
 
 log = logging.getLogger(__name__)
 
@@ -26,17 +26,18 @@ _WORTHWHILE = 0.97  # of J: another reassignment comes before the SQP while they
 _Trial = tuple[StageResult, Reassignment, float]  # what came of a reassignment, and the damping of its model
 
 
-def in_rounds(stages: Stages, start: StageResult, fixed_kit: bool = False) -> StageResult:
+def in_rounds(stages: Stages, start: StageResult, fixed_kit: bool = False, first: int = 1) -> StageResult:
     """Reassign and optimise in turns until neither gains, from a state in which every element is its part.
 
     fixed_kit : keep the parts (projection onto an existing kit), only the assignment changes
+    first : number of the first round
     """
     settings, best, steps = stages.settings, start, start.steps
     if settings.reassignments == 0:
-        return start if fixed_kit else stages.assigned(start)
-    for number in range(1, settings.reassignments + 1):
+        return start if fixed_kit else stages.assigned(start, "assigned" if first == 1 else f"assigned-{first}")
+    for number in range(first, first + settings.reassignments):
         result = _many_reassigned(stages, best, fixed_kit)
-        if result is best and (fixed_kit or number > 1):
+        if result is best and (fixed_kit or number > first):
             break
         if not fixed_kit:
             result = stages.assigned(result, f"assigned-{number}", settings.round_steps)
@@ -45,6 +46,37 @@ def in_rounds(stages: Stages, start: StageResult, fixed_kit: bool = False) -> St
         if np.isfinite(_value(last)) and _value(last) - _value(best) < settings.reassigned_tolerance * _value(last):
             break
     return replace(best, steps=steps, jumps=start.jumps)
+
+
+def that_open(stages: Stages, start: StageResult, fixed_kit: bool = False) -> StageResult:
+    """Designs that open into their shape by themselves, or nearly: rounds from where they open into, again and again.
+
+    The states of the assigned stage are led to from the relaxed ones. Opened from its assembly, a design may end in
+    another stable state; with rounds from there, the optimisation works on the states that a builder will find. Of all
+    results the one is returned whose designs, opened from their assembly, have the lowest J.
+    """
+    settings = stages.settings
+    best, best_value = start, np.inf
+    result = start
+    for number in range(settings.redeployments + 1):
+        found = stages.redeployed(result)
+        opened = stages.judged(replace(result, designs=found))
+        if _value(opened) < best_value or number == 0:
+            best, best_value = result, _value(opened)
+        if number == settings.redeployments or opened.value is None or _all_same(stages, result, opened):
+            break
+        opened = stages.confirmed(opened)
+        if opened.value is None:
+            break
+        first = 1 + (number + 1) * max(settings.reassignments, 1)
+        result = in_rounds(stages, opened, fixed_kit, first)
+    return replace(best, jumps=start.jumps)
+
+
+def _all_same(stages: Stages, led: StageResult, opened: StageResult) -> bool:
+    return all(distance(design, a, b) <= SAME_STATE
+               for design, a, b in zip(stages.dataset.designs, led.designs, opened.designs)
+               if isinstance(a, Evaluation) and isinstance(b, Evaluation))
 
 
 def _many_reassigned(stages: Stages, best: StageResult, fixed_kit: bool) -> StageResult:

@@ -13,6 +13,7 @@ from ..kit.cluster import cluster
 from ..kit.kinds import Bounds
 from ..kit.parts import Assignment, Kit
 from ..kit.projection import Projection
+from ..structures.base import Design
 from .constraints import LinearConstraints, check_feasible
 from .dataset import Dataset, evaluations_from_arrays, evaluations_to_arrays
 from .history import SQPState, StepRecord
@@ -26,6 +27,7 @@ log = logging.getLogger(__name__)
 # A joint that moves this much further in one step of the path than in the steps around it has snapped.
 _JUMP_FACTOR = 6.0
 _JUMP_SHARE = 0.01  # of the bounding box; smaller moves are no snap whatever their ratio
+SAME_STATE = 1e-3  # of the bounding box: states whose joints are this close are one
 
 
 class Store(Protocol):
@@ -59,6 +61,8 @@ class StageSettings:
         one, and the assigned stage end when steps promise or gain less than this share of J
     reassignments : rounds of the assigned stage in which elements get other parts (see reassign.py), at most; a round
         that gains less than `reassigned_tolerance` of J is the last
+    redeployments : how often, after the assigned stage, the designs are opened from their assembly instead of led from
+        the relaxed ones, and the stage goes on from where they end, see `that_open` in rounds.py
     path_steps : steps of the watched path between the stages
     rescues : how often w_c is raised by ten when a design fails on that path, or snaps and there are no reassignments
     growth : how many parts a kind may then get more, when raising w_c didn't help
@@ -79,6 +83,7 @@ class StageSettings:
     assigned_tolerance: float = 1e-4
     reassignments: int = 4
     reassigned_tolerance: float = 2e-2
+    redeployments: int = 0
     path_steps: int = 10
     rescues: int = 2
     growth: int = 0
@@ -377,6 +382,16 @@ def find_jump(design: Any, start: Evaluation, path: Sequence[Evaluation], diagon
     if moves[worst] > _JUMP_SHARE and moves[worst] > _JUMP_FACTOR * np.median(moves):
         return Jump(design.name, (worst + 1) / len(path), float(moves[worst]))
     return None
+
+
+def distance(design: Design, a: Evaluation, b: Evaluation) -> float:
+    """How far apart two states of a design are: the largest distance of a joint, as a share of the bounding box.
+
+    Each state is at its best placement on the target.
+    """
+    role = design.fitted_role.name
+    joints = [e.fit.placement.apply(e.equilibria[role].state.positions[design.joints]) for e in (a, b)]
+    return float(np.linalg.norm(joints[0] - joints[1], axis=1).max()) / a.fit.diagonal
 
 
 def mixed(results: Sequence[StageResult], dataset: Dataset) -> StageResult:

@@ -1,5 +1,6 @@
 """Other parts for elements: never worse under the model, best for every single element, and better designs in the end."""
 import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from kop_exudyn.optimize.job import JobSettings, run_job
 from kop_exudyn.optimize.objective import Weights
 from kop_exudyn.optimize.pool import DesignPool
 from kop_exudyn.optimize.reassign import LocalModel, reassign
-from kop_exudyn.optimize.rounds import in_rounds
+from kop_exudyn.optimize.rounds import in_rounds, that_open
 from kop_exudyn.optimize.stages import Stages, StageSettings
 from kop_exudyn.structures.base import design_from_dict
 
@@ -124,6 +125,20 @@ def test_rounds_with_a_fixed_kit_change_the_assignment_only(stages, direct):
     rounds = in_rounds(stages, direct, fixed_kit=True)
     np.testing.assert_array_equal(rounds.kit.vector, direct.kit.vector)
     assert rounds.value < direct.value and rounds.assignment.changes(direct.assignment) > 0
+
+
+def test_redeployment_improves_what_designs_open_into(stages, direct):
+    led = in_rounds(stages, direct)
+    settings = replace(stages.settings, redeployments=2)
+    willing = Stages(stages.dataset, PARTS, settings)
+    found = that_open(willing, led)
+
+    def opened(result):
+        return sum(outcome.value for outcome in stages.redeployed(result))
+
+    assert opened(found) <= opened(led)
+    assert found.assignment.changes(direct.assignment) > 0
+    assert that_open(stages, led).kit is led.kit  # not asked for: nothing happens
 
 
 def test_constraints_on_elements_hold_in_both_stages(stages):
