@@ -17,6 +17,7 @@ __version__ = "0.1.0"
 _PUBLIC = {
     "errors": ("InputError", "SimulationFailure"),
     "structures.base": ("Design", "ElementGroup", "design_from_dict"),
+    "structures.load_case": ("LoadCase",),
     "kit.parts": ("Assignment", "Kit"),
     "kit.cluster": ("cluster",),
     "optimize.job": ("JobSettings", "run_job"),

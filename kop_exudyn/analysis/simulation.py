@@ -13,6 +13,8 @@ from ..equilibrium.warm_up import warm_up
 from ..errors import SimulationFailure
 from ..optimize.fitting import FitResult, TargetFitting
 from ..structures.base import Design
+from ..structures.load_case import LoadCase
+from .loading import LoadedState, loaded_state
 from .strength import strength_summary
 
 
@@ -25,6 +27,7 @@ class SimulationResult:
     equilibria, confirmations : by role; the states are Exudyn's
     fit : of the deployed joints to the target
     joints : (n, 3) positions
+    loaded : the deployed state under the design's loads, where it has any
     """
 
     design: Design
@@ -36,6 +39,7 @@ class SimulationResult:
     confirmations: dict[str, Confirmation]
     fit: FitResult
     joints: np.ndarray
+    loaded: LoadedState | None = None
 
     @property
     def deployed(self) -> Equilibrium:
@@ -52,15 +56,19 @@ class SimulationResult:
             "exudyn": self.confirmations[self.design.fitted_role.name].to_dict(),
             "fit": {"max_percent": self.fit.max_percent, "mean_percent": self.fit.mean_percent},
             "strength": strength_summary(self.design, self.equilibria),
+            **({"loaded": self.loaded.to_dict()} if self.loaded is not None else {}),
             "joints": self.joints.tolist(),
         }
 
 
-def simulate(design: Design) -> SimulationResult:
-    """Deploy a design and have Exudyn confirm its states.
+def simulate(design: Design, loads: LoadCase | None = None) -> SimulationResult:
+    """Deploy a design and have Exudyn confirm its states, the one under loads included.
 
-    Raises SimulationFailure when a state isn't found, is unstable, or isn't confirmed.
+    loads : default: the design's own
+    Raises SimulationFailure when a state isn't found, is unstable, or isn't confirmed, InputError for loads that the
+    design can't have (see `loaded_state`).
     """
+    loads = design.loads if loads is None else loads
     warm_up()
     begin = perf_counter()
     try:
@@ -77,6 +85,7 @@ def simulate(design: Design) -> SimulationResult:
     joints = design.report_positions(confirmations[role].state)
     fit = TargetFitting(target)(confirmations[role].state.positions[design.joints])
     system = design.systems[role]
+    loaded = None if loads.empty else loaded_state(design, equilibria[role], loads)
     return SimulationResult(
         design, system.n_unknowns, len(system.scene.elements), sum(eq.iterations for eq in equilibria.values()), wall_s,
-        equilibria, confirmations, fit, joints)
+        equilibria, confirmations, fit, joints, loaded)

@@ -14,7 +14,7 @@ that and the transverse shear. Torsion is largest at the middle of a side, so th
 from __future__ import annotations
 
 from dataclasses import dataclass, is_dataclass
-from typing import Any, Iterator, Mapping, Sequence
+from typing import Any, Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -70,11 +70,11 @@ def rod_strength(scene: Scene, equilibrium: Equilibrium, materials: Sequence[Mat
     """
     n = len(scene.elements)
     lengths = scene.rest_lengths(equilibrium.q)
-    axial, normal, shear, equivalent, limit = np.full((5, n), np.nan)
+    axial, normal, shear, equivalent = np.full((4, n), np.nan)
     for section, elements in _by_section(scene):
         rows = _section_stress(section, equilibrium.stress[elements], lengths[elements])
         axial[elements], normal[elements], shear[elements], equivalent[elements] = rows
-        limit[elements] = _limits(scene.stiffness[elements], section, materials)
+    limit = material_values(scene, materials, "elastic_limit", np.fmin)
     return Strength(axial, normal, shear, equivalent, limit)
 
 
@@ -92,6 +92,22 @@ def strength_summary(design: Design, equilibria: Mapping[str, Equilibrium]) -> d
 def materials_of(design: Design) -> tuple[Material, ...]:
     """Materials among a design's attributes, and among the fields of the dataclasses there, in a fixed order."""
     return tuple(dict.fromkeys(_materials_in(vars(design).values(), depth=1)))
+
+
+def material_values(scene: Scene, materials: Sequence[Material], name: str, choose: Callable = np.fmax) -> np.ndarray:
+    """(E,) a property of every rod element's material, NaN where unknown: that of the material that explains its stiffness.
+
+    choose : which one, where several materials do
+    """
+    values = np.full(len(scene.elements), np.nan)
+    for section, elements in _by_section(scene):
+        for material in materials:
+            value = getattr(material, name)
+            if value is not None:
+                same = elements[np.isclose(scene.stiffness[elements], section.stiffness(material), rtol=_SAME_STIFFNESS,
+                                           atol=0).all(axis=1)]
+                values[same] = choose(values[same], value)
+    return values
 
 
 def _materials_in(values: Any, depth: int) -> Iterator[Material]:
@@ -125,14 +141,3 @@ def _section_stress(section: Section, stress: np.ndarray, lengths: np.ndarray) -
     shear = torsion + _TRANSVERSE * np.hypot(Qy, Qz) / section.area
     corner, middle = np.hypot(normal, np.sqrt(3) * torsion), np.hypot(axial, np.sqrt(3) * shear)
     return axial, normal, shear, np.maximum(corner, middle)
-
-
-def _limits(stiffness: np.ndarray, section: Section, materials: Sequence[Material]) -> np.ndarray:
-    """(n,) elastic limits of elements of given stiffness (n, 6): the smallest of all materials that explain it."""
-    limits = np.full(len(stiffness), np.inf)
-    for material in materials:
-        if material.elastic_limit is not None:
-            same = np.isclose(stiffness, section.stiffness(material), rtol=_SAME_STIFFNESS, atol=0).all(axis=1)
-            limits[same] = np.minimum(limits[same], material.elastic_limit)
-    limits[np.isinf(limits)] = np.nan
-    return limits

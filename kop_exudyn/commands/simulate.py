@@ -5,29 +5,42 @@ import argparse
 import sys
 from pathlib import Path
 
+from .values import gravity
+
 HELP = "deploy one design and say how well it fits its target"
 DESCRIPTION = """Deploys a design, has Exudyn confirm the equilibrium, and reports its energy, its stability and
-how far its joints are from the target surface."""
+how far its joints are from the target surface, and the largest stress in its rods. With loads, from the design file or
+by --gravity, also the deflection and the stress under them."""
 EXAMPLES = """examples:
   kop simulate models/conformals/01_sinh.json
-  kop simulate design.json --json > state.json"""
+  kop simulate design.json --json > state.json
+  kop simulate models/grids/01_dome.json --gravity
+  kop simulate design.json --gravity=0,0,-9810"""
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("design", type=Path, metavar="DESIGN", help="design file (.json or .json.gz)")
+    parser.add_argument("--gravity", nargs="?", type=gravity, const=gravity("9.81"), metavar="G", help="let the rods' weight "
+                        "act: an acceleration down the z axis (default: 9.81, for lengths in metres) or a vector X,Y,Z, "
+                        "in the design's units; instead of the design file's gravity. Materials need a density")
     parser.add_argument("--json", action="store_true", help="print JSON for other programs, joint positions included; "
                         "of a simulation that fails, the design's name and the reason")
 
 
 def run(args: argparse.Namespace) -> int:
+    from dataclasses import replace
+
+    import numpy as np
+
     from ..analysis.simulation import simulate
     from ..errors import SimulationFailure
     from ..io.designs import load_design
     from ..io.json_files import to_json
 
     design = load_design(args.design)
+    own = () if args.gravity is None else (replace(design.loads, gravity=np.array(args.gravity)),)
     try:
-        result = simulate(design).to_dict()
+        result = simulate(design, *own).to_dict()
     except SimulationFailure as failure:
         if args.json:
             sys.stdout.write(to_json({"design": design.name, "failed": str(failure)}))
@@ -50,4 +63,28 @@ def _summary(result: dict) -> str:
     }
     if result["opening_angle"] is not None:
         rows["opening angle"] = f"{result['opening_angle']:.4g} rad"
-    return "".join(f"{name:<15} {value}\n" for name, value in rows.items())
+    rows |= {f"stress, {role}": _stress(strength) for role, strength in result["strength"].items()}
+    if "loaded" in result:
+        rows |= _under_load(result["loaded"])
+    width = max(15, *map(len, rows))
+    return "".join(f"{name:<{width}} {value}\n" for name, value in rows.items())
+
+
+def _under_load(loaded: dict) -> dict[str, str]:
+    """Rows about the loaded state."""
+    deflection = loaded["deflection"]
+    return {
+        "load": f"({', '.join(f'{f:.4g}' for f in loaded['total_force'])}) in all, held at {len(loaded['supports'])} joints",
+        "deflection": f"max {deflection['max']:.3g} ({deflection['max_percent']:.3g} % of the diagonal), "
+                      f"mean {deflection['mean']:.3g} ({deflection['mean_percent']:.3g} %)",
+        "stress, loaded": _stress(loaded["strength"]),
+        "stable, loaded": "yes" if loaded["stable"] else "no",
+    }
+
+
+def _stress(strength: dict) -> str:
+    """The largest equivalent stress, and what it is of the elastic limit."""
+    if strength["equivalent_stress"] is None:
+        return "unknown: the rods have no section"
+    used = "" if strength["utilisation"] is None else f", {100 * strength['utilisation']:.3g} % of the elastic limit"
+    return f"{strength['equivalent_stress']:.4g}{used}"

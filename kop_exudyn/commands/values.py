@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 
 
 def part_counts(text: str) -> dict[str, int]:
@@ -37,6 +38,17 @@ def positive(text: str) -> int:
 def not_negative(text: str) -> int:
     """A whole number of at least 0."""
     return _whole(text, 0, "the value")
+
+
+def gravity(text: str) -> tuple[float, float, float]:
+    """``9.81`` as (0, 0, -9.81), down the z axis; ``0,0,-9.81`` as it is."""
+    try:
+        numbers = [float(piece) for piece in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (1, 3) or not all(map(math.isfinite, numbers)):
+        raise argparse.ArgumentTypeError(f"expected a number or X,Y,Z, got {text!r}")
+    return (0.0, 0.0, -numbers[0]) if len(numbers) == 1 else tuple(numbers)
 
 
 def _whole(text: str, least: int, what: str) -> int:

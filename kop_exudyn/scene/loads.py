@@ -140,12 +140,12 @@ class Scaled:
         return self.factor * energy, self.factor * g, self.factor * H
 
 
-def with_self_weight(scene: Scene, density: float, gravity: Any, areas: Any = None) -> Scene:
+def with_self_weight(scene: Scene, density: Any, gravity: Any, areas: Any = None) -> Scene:
     """The same scene with its rods' own weight added to the dead load that it has.
 
     Parameters
     ----------
-    density : mass / length^3
+    density : mass / length^3, one number or (E,)
     gravity : (3,) acceleration, global axes
     areas : (E,) or one cross-section area; default: those of the rods' sections
 
@@ -159,13 +159,14 @@ def with_self_weight(scene: Scene, density: float, gravity: Any, areas: Any = No
                 raise InputError("a rod without section needs an area", field="loads.areas", value=number)
             areas[chain.elements] = chain.section.area
     try:
-        areas = np.broadcast_to(np.asarray(areas, float), n)
+        density, areas = (np.broadcast_to(np.asarray(values, float), n) for values in (density, areas))
         gravity = np.broadcast_to(np.asarray(gravity, float), 3)
     except ValueError:
-        raise InputError(f"expected one area or {n}, and gravity of three components", field="loads") from None
-    if not (0 < density < np.inf and (areas > 0).all() and np.isfinite(areas).all() and np.isfinite(gravity).all()):
+        raise InputError(f"expected one density and area or {n}, and gravity of three components", field="loads") from None
+    positive = all(((values > 0) & np.isfinite(values)).all() for values in (density, areas))
+    if not (positive and np.isfinite(gravity).all()):
         raise InputError("density and areas must be positive, gravity finite", field="loads")
-    own = density * areas[:, None] * gravity
+    own = (density * areas)[:, None] * gravity
     return replace(scene, weight=own if scene.weight is None else scene.weight + own)
 
 

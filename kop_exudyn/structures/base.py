@@ -12,6 +12,7 @@ from typing import Any, Callable, ClassVar, Iterator, Mapping, TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
+from .load_case import LoadCase, load_case_from_dict
 
 if TYPE_CHECKING:
     from ..equilibrium.newton import Equilibrium
@@ -84,6 +85,8 @@ class Design(ABC):
     fit_weight: ClassVar[float] = 1e4
     # Typical change of parameters that belong to no element.
     free_scale: float = 1.0
+    # What acts on the deployed design; the search for a kit is for the unloaded one.
+    loads: LoadCase = LoadCase()
     name: str
     parameters: np.ndarray
     lower: np.ndarray
@@ -170,7 +173,11 @@ def design_from_dict(data: Mapping[str, Any], source: str = "design") -> Design:
     if class_name not in _REGISTRY:
         known = ", ".join(sorted(_REGISTRY))
         raise InputError(f"unknown structure class (known: {known})", source=source, field="class", value=class_name)
-    return _REGISTRY[class_name](data, source)
+    design = _REGISTRY[class_name](data, source)
+    if "loads" in data or "supports" in data:
+        design.loads = load_case_from_dict(data)
+        design.loads.check(len(design.joints), source)
+    return design
 
 
 def _load_folder() -> None:

@@ -1,0 +1,198 @@
+"""A deployed design under loads: held at its supports, with its own weight and forces on joints.
+
+The supports hold joints where the unloaded state has them, free to turn, instead of what fixes the free design in space;
+so without loads nothing changes. What opens the design (the mean opening angle of C-shells, an umbrella mesh's
+actuators) stays as it is. Loads grow in equal steps, so that the state is the one that the unloaded one deforms into.
+"""
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from ..equilibrium.exudyn_model import Confirmation, ExudynModel
+from ..equilibrium.newton import Equilibrium, refine, solve
+from ..equilibrium.system import System
+from ..errors import InputError, SimulationFailure
+from ..scene.loads import DeadForces, Scaled, with_self_weight
+from ..scene.scene import Scene
+from ..structures.base import Design
+from ..structures.load_case import LoadCase
+from .strength import Strength, material_values, materials_of, rod_strength
+
+_STEPS = 4
+_LOWER = 0.5  # of the height: joints below are supports
+_STRAIGHT = 1e-3  # supports within this share of their extent from a line don't hold a structure
+_DOWN = np.array([0.0, 0.0, -1.0])  # where supports are looked for without gravity
+
+
+@dataclass(frozen=True)
+class LoadedState:
+    """A design under a load case; lengths and forces in the design's units.
+
+    supports : (k,) joints that are held
+    total_force : (3,) sum of all loads
+    displacements : (N, 3) of the rods' nodes against the unloaded state
+    diagonal : of the target's bounding box, to which percentages refer
+    equilibrium, confirmation : of the loaded scene; the state is Exudyn's
+    """
+
+    case: LoadCase
+    supports: np.ndarray
+    total_force: np.ndarray
+    displacements: np.ndarray
+    diagonal: float
+    equilibrium: Equilibrium
+    confirmation: Confirmation
+    strength: Strength
+    joints: np.ndarray
+
+    @property
+    def deflections(self) -> np.ndarray:
+        """(N,) how far the rods' nodes move."""
+        return np.linalg.norm(self.displacements, axis=1)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As `kop simulate --json` has it."""
+        d, case = self.deflections, self.case
+        return {
+            "gravity": None if case.gravity is None else case.gravity.tolist(),
+            "total_force": self.total_force.tolist(), "supports": self.supports.tolist(),
+            "deflection": {"max": float(d.max()), "mean": float(d.mean()),
+                           "max_percent": 100 * float(d.max()) / self.diagonal,
+                           "mean_percent": 100 * float(d.mean()) / self.diagonal},
+            "elastic_energy": self.equilibrium.elastic_energy, "stable": self.equilibrium.stable,
+            "strength": self.strength.to_dict(), "exudyn": self.confirmation.to_dict(), "joints": self.joints.tolist(),
+        }
+
+
+def loaded_state(design: Design, unloaded: Equilibrium, case: LoadCase) -> LoadedState:
+    """The state that the deployed design's equilibrium deforms into under a load case.
+
+    Raises InputError where a density is missing or the supports don't hold the design, SimulationFailure when it finds
+    no equilibrium under all of the load, or Exudyn doesn't confirm it.
+    """
+    case.check(len(design.joints), design.name)
+    role = design.fitted_role.name
+    supports = supports_of(design, unloaded, case)
+    held = _held(design.scene(role), unloaded, design.joints[supports])
+    found, scene = unloaded, held
+    for share in np.linspace(0, 1, _STEPS + 1)[1:]:
+        scene = _loaded(design, held, unloaded, case, share)
+        try:
+            found = solve(system := System(scene), unloaded.q, found, unloaded.opening)
+        except SimulationFailure as failure:
+            raise failure.within(f"{design.name}: under {share:.0%} of its loads") from None
+    found = refine(system, found)
+    try:
+        confirmation = ExudynModel(scene).confirm(found)
+    except SimulationFailure as failure:
+        raise failure.within(f"{design.name}: under its loads") from None
+    found = replace(found, state=confirmation.state)
+    moved = scene.node_poses(found.state)[0] - scene.node_poses(unloaded.state)[0]
+    return LoadedState(case, supports, _total_force(scene, unloaded), moved, design.target.diagonal, found, confirmation,
+                       rod_strength(scene, found, materials_of(design)), design.report_positions(found.state))
+
+
+def supports_of(design: Design, unloaded: Equilibrium, case: LoadCase) -> np.ndarray:
+    """(k,) joints that hold the design: those of the load case, those that the design is pinned at, or chosen ones.
+
+    Chosen: corners of the joints' convex hull in plan (seen along gravity) that lie in the lower half of the height;
+    all of these corners where the lower ones don't surround the joints' mean, around which they would tip over.
+    Raises InputError when they lie on one line.
+    """
+    x = unloaded.state.positions[design.joints]
+    pinned = _pinned_joints(design)
+    if case.supports is not None:
+        found = np.union1d(case.supports, pinned)
+    elif len(pinned):
+        found = pinned
+    else:
+        down = _DOWN if case.gravity is None or not case.gravity.any() else case.gravity
+        found = _outermost(x, down / np.linalg.norm(down))
+    extents = np.linalg.svd(x[found] - x[found].mean(axis=0), compute_uv=False)
+    if len(found) < 3 or not extents[1] > _STRAIGHT * extents[0]:
+        raise InputError("supports on one line don't hold a structure", source=design.name, field="supports",
+                         value=found.tolist())
+    return found
+
+
+def _pinned_joints(design: Design) -> np.ndarray:
+    """Joints whose places the design's parameters prescribe."""
+    scene = design.scene(design.fitted_role.name)
+    dofs = scene.driven.dofs[scene.driven.dofs < 6 * scene.n_bodies]
+    return np.flatnonzero(np.isin(design.joints, dofs // 6))
+
+
+def _outermost(x: np.ndarray, down: np.ndarray) -> np.ndarray:
+    """The lower ones of the joints x (n, 3) that are outermost in plan, or all outermost ones."""
+    plan = np.linalg.svd(down[None])[2][1:]
+    flat, height = x @ plan.T, -x @ down
+    try:
+        outer = np.sort(ConvexHull(flat).vertices)
+    except QhullError:
+        raise InputError("joints on one line in plan can't hold a structure", field="supports") from None
+    limit = height[outer].min() + _LOWER * np.ptp(height[outer])
+    low = outer[height[outer] <= limit + 1e-9 * np.ptp(flat)]
+    return low if _surround(flat[low], flat.mean(axis=0)) else outer
+
+
+def _surround(points: np.ndarray, centre: np.ndarray) -> bool:
+    """Whether the centre (2,) lies within the convex hull of points (k, 2)."""
+    try:
+        sides = ConvexHull(points).equations
+    except (QhullError, ValueError):
+        return False
+    return bool((sides[:, :2] @ centre + sides[:, 2] < 0).all())
+
+
+def _held(scene: Scene, unloaded: Equilibrium, bodies: np.ndarray) -> Scene:
+    """The scene in its unloaded state, held by these bodies' positions instead of any other pins."""
+    pinned = scene.pinned.copy()
+    pinned[: 6 * scene.n_bodies] = False
+    free = np.setdiff1d((6 * bodies[:, None] + np.arange(3)).ravel(), scene.driven.dofs)
+    pinned[free] = True
+    return replace(scene, pinned=pinned, initial=unloaded.state)
+
+
+def _loaded(design: Design, scene: Scene, unloaded: Equilibrium, case: LoadCase, share: float) -> Scene:
+    """The held scene with a share of the loads."""
+    terms = list(scene.terms)
+    if len(case.joints):
+        terms.append(Scaled(DeadForces(design.joints[case.joints], case.forces), share))
+    if case.gravity is not None and case.gravity.any():
+        materials = materials_of(design)
+        density = material_values(scene, materials, "density")
+        if not np.isfinite(density).all():
+            raise InputError("self-weight needs the density of every material", source=design.name,
+                             field="material.density")
+        scene = with_self_weight(scene, density, share * case.gravity)
+        terms += _rigid_weight(scene, unloaded, max(materials, key=lambda m: m.young).density, share * case.gravity)
+    return scene.with_terms(*terms)
+
+
+def _rigid_weight(scene: Scene, unloaded: Equilibrium, density: float | None, gravity: np.ndarray) -> list[DeadForces]:
+    """The weight of pieces that don't bend, which are of the stiffest material, at their middles."""
+    rigid = [chain for chain in scene.chains if not len(chain.elements) and chain.section is not None]
+    if not rigid:
+        return []
+    if density is None:
+        raise InputError("self-weight needs the density of every material", field="material.density")
+    x, arms = scene.node_poses(unloaded.state)[0], scene.node_arms(unloaded.state)[0]
+    mass = [density * chain.section.area * np.linalg.norm(x[chain.nodes[-1]] - x[chain.nodes[0]]) for chain in rigid]
+    return [DeadForces([scene.node_body[chain.nodes[0]] for chain in rigid], np.outer(mass, gravity),
+                       [arms[chain.nodes[[0, -1]]].mean(axis=0) for chain in rigid])]
+
+
+def _total_force(scene: Scene, unloaded: Equilibrium) -> np.ndarray:
+    """(3,) weight and forces, summed."""
+    total = np.zeros(3)
+    if scene.weight is not None:
+        total += scene.rest_lengths(unloaded.q) @ scene.weight
+    for term in scene.terms:
+        forces, factor = (term.term, term.factor) if isinstance(term, Scaled) else (term, 1.0)
+        if isinstance(forces, DeadForces):
+            total += factor * forces.forces.sum(axis=0)
+    return total

@@ -1,0 +1,140 @@
+"""Designs under loads: statics that must hold whatever the design, supports, and what the command line says."""
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kop_exudyn.analysis.loading import loaded_state, supports_of
+from kop_exudyn.analysis.simulation import simulate
+from kop_exudyn.analysis.strength import materials_of
+from kop_exudyn.cli import main
+from kop_exudyn.errors import InputError
+from kop_exudyn.io.designs import load_design
+from kop_exudyn.structures.base import design_from_dict
+from kop_exudyn.structures.load_case import LoadCase
+
+GRAVITY = np.array([0.0, 0.0, -9.81])
+
+
+@pytest.fixture(scope="module")
+def dome(repository):
+    return load_design(repository / "models" / "grids" / "01_dome.json")
+
+
+@pytest.fixture(scope="module")
+def opened(dome):
+    return dome.deploy()["deployed"]
+
+
+def test_weight_is_that_of_the_rods(dome, opened):
+    found = loaded_state(dome, opened, LoadCase(GRAVITY))
+    length = dome.scene().rest_lengths(dome.parameters).sum()
+    assert found.total_force == pytest.approx(900 * 0.004 * 0.03 * length * GRAVITY)
+    assert 0 < found.deflections.mean() < found.deflections.max() < 0.01 * found.diagonal
+    held = found.equilibrium.state.positions[dome.joints[found.supports]]
+    np.testing.assert_allclose(held, opened.state.positions[dome.joints[found.supports]], atol=1e-10)
+    assert found.confirmation.moved < 1e-8 and found.equilibrium.stable
+
+
+def test_the_dome_stands_on_its_lowest_boundary(dome, opened):
+    supports = supports_of(dome, opened, LoadCase(GRAVITY))
+    x = opened.state.positions[dome.joints]
+    corners = {0, 8, 72, 80}
+    assert corners <= set(supports.tolist()) and x[supports, 2].max() < x[:, 2].mean()
+    np.testing.assert_array_equal(supports_of(dome, opened, LoadCase(GRAVITY, supports=np.array([8, 0, 72]))), [0, 8, 72])
+
+
+def test_forces_and_displacements_are_reciprocal(dome, opened):
+    """Maxwell and Betti: what a small force at i does at j is what the same at j does at i."""
+    def moved(at: int, along: int, seen: int, across: int) -> float:
+        cases = [LoadCase(joints=np.array([at]), forces=size * np.eye(3)[[along]], supports=np.array([0, 8, 72, 80]))
+                 for size in (0.01, -0.01)]
+        there, back = (loaded_state(dome, opened, case).equilibrium.state.positions for case in cases)
+        return (there - back)[dome.joints[seen], across]
+
+    there, back = moved(40, 2, 13, 0), moved(13, 0, 40, 2)
+    assert abs(there) > 1e-6
+    assert there == pytest.approx(back, rel=1e-4)
+
+
+def test_a_force_on_a_support_changes_nothing(dome, opened):
+    case = LoadCase(joints=np.array([8]), forces=np.array([[3.0, -2.0, 5.0]]), supports=np.array([0, 8, 72, 80]))
+    assert loaded_state(dome, opened, case).deflections.max() < 1e-9
+
+
+def test_a_c_shell_under_the_loads_of_its_file(c_shell_data):
+    c_shell_data["material"]["density"] = 0.01
+    design = design_from_dict(c_shell_data | {"loads": {"gravity": [0, 0, -9.81], "points": [
+        {"joint": 4, "force": [0, 0, -1e-3]}]}, "supports": [0, 2, 6, 8]})
+    found = simulate(design)
+    assert found.loaded.supports.tolist() == [0, 2, 6, 8]
+    weight = 0.01 * 9.81 * 0.02 * 0.01 * design.scene("deployed").rest_lengths(design.parameters).sum()
+    assert found.loaded.total_force[2] == pytest.approx(-weight - 1e-3)
+    down = found.loaded.equilibrium.state.positions[4, 2] - found.deployed.state.positions[4, 2]
+    assert down < 0
+    assert found.to_dict()["loaded"]["deflection"]["max"] >= -down
+    assert simulate(design, LoadCase()).loaded is None
+
+
+@pytest.mark.parametrize("pins, supports", [(None, 4), ({"joints": "corners"}, 3)])
+def test_umbrella_meshes_stand_on_their_pins_or_corners(repository, pins, supports):
+    """Rigid plates have no elements, but weigh as much as bending ones."""
+    data = json.loads((repository / "models" / "umbrellas" / "hill.json").read_text())
+    for material in data["materials"].values():
+        material["density"] = 9e-10
+    found = []
+    for model in ("rods", "rigid"):
+        design = design_from_dict(data | {"plate_model": model} | ({"pins": pins} if pins else {}))
+        unloaded = design.deploy()["deployed"]
+        found.append(loaded_state(design, unloaded, LoadCase(1000 * GRAVITY)))
+        held = design.joints[found[-1].supports]
+        assert len(held) == supports
+        moved = found[-1].equilibrium.state.positions[held] - unloaded.state.positions[held]
+        assert np.abs(moved).max() < 1e-8 * found[-1].diagonal
+        assert found[-1].deflections.max() > 1e-5 * found[-1].diagonal
+    assert found[0].total_force == pytest.approx(found[1].total_force, rel=1e-9)
+    assert found[0].deflections.max() == pytest.approx(found[1].deflections.max(), rel=0.3)
+
+
+def test_unusable_loads(dome, opened, c_shell_data):
+    def loads(**changes):
+        return loaded_state(dome, opened, replace(LoadCase(GRAVITY), **changes))
+
+    with pytest.raises(InputError, match="supports.*one line"):
+        loads(supports=np.array([0, 1, 2]) * 0)
+    with pytest.raises(InputError, match="loads.points = 81: names a joint"):
+        loads(joints=np.array([81]), forces=np.ones((1, 3)))
+    with pytest.raises(InputError, match="supports = 99: names a joint"):
+        design_from_dict(c_shell_data | {"supports": [0, 1, 99]}, "file")
+    light = design_from_dict(c_shell_data)
+    assert materials_of(light)[0].density is None
+    with pytest.raises(InputError, match="material.density: self-weight needs"):
+        simulate(light, LoadCase(GRAVITY))
+
+
+@pytest.mark.parametrize("change, message", [
+    ({"loads": {"gravity": [0, 0]}}, "loads.gravity.*must have at least 3"),
+    ({"loads": {"wind": 1}}, "loads.wind: unknown field"),
+    ({"loads": {"points": [{"joint": 1}]}}, r"loads.points\[0\].force: is missing"),
+    ({"supports": [1, 2]}, "supports.*at least 3"),
+])
+def test_fields_of_the_design_file(c_shell_data, write_json_file, change, message):
+    with pytest.raises(InputError, match=message):
+        load_design(write_json_file("design.json", c_shell_data | change))
+
+
+def test_command_line(repository, capsys):
+    path = str(repository / "models" / "grids" / "01_dome.json")
+    assert main(["simulate", path, "--gravity", "20", "--json"]) == 0
+    loaded = json.loads(capsys.readouterr().out)["loaded"]
+    assert loaded["gravity"] == [0, 0, -20] and loaded["deflection"]["max_percent"] > 0
+    assert loaded["strength"]["utilisation"] == pytest.approx(loaded["strength"]["equivalent_stress"] / 4e7)
+    assert main(["simulate", path, "--gravity=0,0,-9.81"]) == 0
+    text = capsys.readouterr().out
+    assert "deflection       max 0.000657" in text and "of the elastic limit" in text
+    with pytest.raises(SystemExit):
+        main(["simulate", path, "--gravity", "1,2"])
+    assert "expected a number or X,Y,Z" in capsys.readouterr().err
