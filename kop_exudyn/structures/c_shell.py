@@ -31,6 +31,7 @@ _OPENING_STEP = 0.1  # rad of mean joint angle a step
 _LARGEST_CORNER = 2.5  # rad
 _IMPERFECTION = 1e-3  # of the size, height of the shallow surface that imperfect rest shapes follow
 _REFINEMENTS = 3  # of the target's triangles
+_INWARD = 1e-6  # of the way to the middle
 
 
 class CShell(Design):
@@ -106,9 +107,12 @@ class CShell(Design):
         vertices, faces = self.network.joints, self._triangles
         for _ in range(_REFINEMENTS):
             vertices, faces = _split(vertices, faces)
-        lifted = CloughTocher2DInterpolator(Delaunay(flat), state.positions, tol=1e-10)(vertices)
+        lift = CloughTocher2DInterpolator(Delaunay(flat), state.positions, tol=1e-10)
+        lifted = lift(vertices)
         joints = state.positions[self.joints]
-        lifted[: len(joints)] = joints  # exact there; the rest lies inside the flat hull
+        lifted[: len(joints)] = joints  # exact there; the rest lies inside the flat hull,
+        outside = np.isnan(lifted).any(axis=1)  # but for round-off beside straight outer curves
+        lifted[outside] = lift(vertices[outside] + _INWARD * (flat.mean(axis=0) - vertices[outside]))
         used = np.unique(faces)
         faces = np.searchsorted(used, faces)
         return Target(lifted[used], faces, joints, float(np.linalg.norm(np.ptp(lifted[used], axis=0))))
