@@ -20,6 +20,7 @@ _PUBLIC = {
     "structures.load_case": ("LoadCase",),
     "kit.parts": ("Assignment", "Kit"),
     "kit.cluster": ("cluster",),
+    "optimize.input_fit": ("fit_input",),
     "optimize.job": ("JobSettings", "run_job"),
     "optimize.objective": ("Weights",),
     "optimize.stages": ("StageSettings",),

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import SimulationFailure
 from ..kit.parts import Assignment, Kit
+from ..optimize.fitting import TargetFitting
 from ..optimize.objective import Evaluation, Reference
 from ..optimize.stages import SAME_STATE, StageEvent, StageResult, distance
 from ..structures.base import Design
@@ -54,6 +55,14 @@ class KitResult:
         outcome = self.stages[stage].designs[number]
         return summary_of(outcome, self.designs[number], self.references[number])
 
+    def input_summary(self, number: int) -> dict[str, Any]:
+        """Fit and energy of one input design: what of a stage's deviation no kit is to blame for."""
+        design, reference = self.designs[number], self.references[number]
+        joints = reference.equilibria[design.fitted_role.name].state.positions[design.joints]
+        fit = TargetFitting(reference.target)(joints)
+        return {"fit": {"max_percent": fit.max_percent, "mean_percent": fit.mean_percent},
+                "elastic_energy": reference.energy}
+
     def redeployment(self, number: int) -> dict[str, Any]:
         """Where the assigned design's parts open into by themselves: fit, energy, and whether it's the kept state.
 
@@ -76,7 +85,7 @@ class KitResult:
         """As result.json has it."""
         return {
             "designs": [
-                {"name": design.name, "elements": design.n_elements,
+                {"name": design.name, "elements": design.n_elements, "input": self.input_summary(n),
                  **{stage: self.summary(stage, n) for stage in STAGES if stage in self.stages},
                  **({"redeployed": self.redeployment(n)} if self.redeployed else {})}
                 for n, design in enumerate(self.designs)],

@@ -92,13 +92,13 @@ def _cloud(label: str, kind_name: str, members: Sequence[tuple[ElementGroup, int
 def summary_rows(result: KitResult) -> tuple[list[str], list[list]]:
     """Headings and rows of the table of all designs: deviations after every stage, then figures of the assigned one."""
     stages = [stage for stage in STAGES if stage in result.stages]
-    headings = ["design", "elements", *(f"{stage}, max %" for stage in stages), "assigned, mean %", "energy ratio",
-                "largest stress", "utilisation", "stable"]
+    headings = ["design", "elements", *(f"{stage}, max %" for stage in (INPUT, *stages)), "assigned, mean %",
+                "energy ratio", "largest stress", "utilisation", "stable"]
     rows = []
     for n, design in enumerate(result.designs):
         found = {stage: result.summary(stage, n) for stage in stages}
         final = found["assigned"]
-        largest = [_fit(found[stage], "max_percent") for stage in stages]
+        largest = [_fit(summary, "max_percent") for summary in (result.input_summary(n), *found.values())]
         rows.append([design.name, design.n_elements, *largest, _fit(final, "mean_percent"), final.get("energy_ratio"),
                      _worst(final, "equivalent_stress"), _worst(final, "utilisation"), final.get("stable")])
     return headings, rows

@@ -40,10 +40,11 @@ def _page(result: KitResult, figures: dict) -> Page:
                 f"{sizes} parts realise the {elements} elements of {', '.join(d.name for d in result.designs)}.")
     page.table(*summary_rows(result),
                "Distance of the joints from the target surface, in % of its bounding-box diagonal; elastic energy "
-               "relative to the input design's. Direct: every input element replaced by its part. Unrelaxed: parts "
-               "then tuned. Relaxed: elements still free. Assigned: built from the kit. Stress: the largest equivalent "
-               "one (von Mises) in the assigned design's rods, in all of its states; utilisation: the largest share of "
-               "the material's elastic limit. A dash: no equilibrium found, or no section or limit known.")
+               "relative to the input design's. Input: the designs as given. Direct: every input element replaced by "
+               "its part. Unrelaxed: parts then tuned. Relaxed: elements still free. Assigned: built from the kit. "
+               "Stress: the largest equivalent one (von Mises) in the assigned design's rods, in all of its states; "
+               "utilisation: the largest share of the material's elastic limit. A dash: no equilibrium found, or no "
+               "section or limit known.")
     page.text("\n\n".join(remarks(result)))
     page.section("The designs").figure(
         figures["designs"], "Rods and joints at the best placement on the target; grey: the input design.",

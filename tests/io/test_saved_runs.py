@@ -7,6 +7,7 @@ from kop_exudyn.errors import InputError
 from kop_exudyn.io.arrays import load_arrays, save_arrays
 from kop_exudyn.io.results import load_result, save_result, save_states
 from kop_exudyn.io.saved_runs import load_run
+from kop_exudyn.optimize.fitting import TargetFitting
 from kop_exudyn.optimize.job import JobSettings, run_job
 from kop_exudyn.optimize.stages import StageSettings
 from kop_exudyn.report.kit_drawings import final_states, summary_rows
@@ -63,6 +64,17 @@ def test_strength_is_in_every_stage(finished):
     headings, rows = summary_rows(result)
     largest = max(s["utilisation"] for s in result.summary("assigned", 0)["strength"].values())
     assert rows[0][headings.index("utilisation")] == largest
+
+
+def test_results_tell_how_far_the_inputs_are_off_their_targets(finished, shells):
+    result, folder = finished
+    headings, rows = summary_rows(result)
+    for n, entry in enumerate(load_result(folder / "result.json")["designs"]):
+        joints = shells[n].deploy()["deployed"].state.positions[shells[n].joints]
+        found = entry["input"]["fit"]["max_percent"]
+        assert rows[n][headings.index("input, max %")] == found
+        assert entry["input"]["elastic_energy"] == result.references[n].energy
+        assert found == pytest.approx(TargetFitting(shells[n].target)(joints).max_percent, rel=1e-4)
 
 
 def test_folders_of_earlier_versions(finished, shells, tmp_path):
