@@ -1,13 +1,11 @@
-"""Sparse LDL^T by QDLDL: symbolic analysis once a topology, then numeric refactorisations; solves by blocks."""
+"""Sparse LDL^T by QDLDL: symbolic analysis once a topology, then numeric refactorisations."""
 from __future__ import annotations
 
-import numba as nb
 import numpy as np
 import qdldl
 import scipy.sparse as sp
 
-# Right-hand sides solved together: enough to fill vector registers, few enough for the rows to stay in cache.
-_BLOCK = 16
+from .block_solve import panels_of, solve_columns
 
 
 class Factorisation:
@@ -19,6 +17,7 @@ class Factorisation:
     def __init__(self) -> None:
         self._solver: qdldl.Solver | None = None
         self._factors: tuple[sp.csc_matrix, np.ndarray, np.ndarray] | None = None
+        self._panels: np.ndarray | None = None  # of L, whose pattern stays the same as well
         self.pivots = np.empty(0)
 
     def update(self, upper: sp.csc_matrix) -> int:
@@ -42,51 +41,21 @@ class Factorisation:
         return self._solver is None
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
-        """Solve for one right-hand side (n,) or for many (n, k)."""
+        """Solve for one right-hand side (n,) or for a few (n, k)."""
         if rhs.ndim == 1:
             return self._solver.solve(rhs)
-        L, D, order = self._factors
-        out = np.empty(rhs.shape)
-        _solve_blocks(L.indptr, L.indices, L.data, 1 / D, np.asarray(order), np.ascontiguousarray(rhs), out)
-        return out
+        return np.stack([self._solver.solve(np.ascontiguousarray(column)) for column in rhs.T], axis=1)
+
+    def solve_columns(
+        self, rhs: sp.csc_matrix, column: np.ndarray | None = None, shares: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Solve for many sparse right-hand sides (n, k); column shares^T (n,), (k,) is taken off the result."""
+        L, pivots, order = self._factors
+        if self._panels is None:
+            self._panels = panels_of(L.indptr, L.indices)
+        return solve_columns(L, pivots, np.asarray(order), self._panels, rhs, column, shares)
 
     @property
     def factor_entries(self) -> int:
         """Non-zeros of L."""
         return 0 if self._factors is None else self._factors[0].nnz
-
-
-@nb.njit(cache=True)
-def _solve_blocks(indptr, indices, data, inverse_pivots, order, rhs, out):
-    """Forward, diagonal and backward substitution for blocks of columns at once (A = P L D L^T P^T).
-
-    Right-hand sides of sensitivities are sparse, so the forward pass skips rows that are still zero.
-    """
-    n, total = rhs.shape
-    work = np.empty((n, _BLOCK))
-    for start in range(0, total, _BLOCK):
-        k = min(_BLOCK, total - start)
-        for i in range(n):
-            for c in range(_BLOCK):
-                work[i, c] = rhs[order[i], start + c] if c < k else 0.0
-        for j in range(n):
-            filled = False
-            for c in range(_BLOCK):
-                filled |= work[j, c] != 0.0
-            if not filled:
-                continue
-            for t in range(indptr[j], indptr[j + 1]):
-                i, v = indices[t], data[t]
-                for c in range(_BLOCK):
-                    work[i, c] -= v * work[j, c]
-        for i in range(n):
-            for c in range(_BLOCK):
-                work[i, c] *= inverse_pivots[i]
-        for j in range(n - 1, -1, -1):
-            for t in range(indptr[j], indptr[j + 1]):
-                i, v = indices[t], data[t]
-                for c in range(_BLOCK):
-                    work[j, c] -= v * work[i, c]
-        for i in range(n):
-            for c in range(k):
-                out[order[i], start + c] = work[i, c]

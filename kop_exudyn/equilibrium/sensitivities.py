@@ -41,34 +41,27 @@ class Sensitivities:
             self._strain, system.lengths, scene.stiffness, scene.rest_strain)
         self._energy_L, self._stress_L = energy_L, stress_L
         self._has = np.flatnonzero(scene.length_parameter >= 0)
-        self._coupling = s.driven_columns(system.values.copy())
+        self._driven_values = system.values[s.n_factor_values:].copy()
         self._gradient = system.gradient.copy()
-        self._B = system.strain_displacement  # copied only if the system moves on, see _stress_change
+        self._B = system.strain_displacement  # the system's own: like its factorisation, good until it moves on
+        self._length_entries = self._differentiate_by_length()
         self._residual_q = self._assemble_residual_q()
 
     # -- states ----------------------------------------------------------------------------------------------------
     @cached_property
     def full(self) -> np.ndarray:
         """x_q (n_free, n_parameters): all free unknowns in all parameters; angles in rad, translations global."""
-        return self._rows_of_full(slice(None))
-
-    @cached_property
-    def _unconstrained(self) -> np.ndarray:
-        """-K^-1 R_q (n_free, n_parameters), before the actuation's equation is put in."""
-        return self.system.solve(-self._residual_q[: self._n].toarray(order="C"))
-
-    def _rows_of_full(self, rows: np.ndarray | slice) -> np.ndarray:
-        """Rows of x_q; the border's rank-one part is added to these rows only, the whole is seldom needed."""
+        rhs = -self._residual_q
         if self._border is None:
-            return self._unconstrained[rows]
-        return self._unconstrained[rows] - np.outer(self._border.column[rows], self.torque_gradient)
+            return self.system.solve_columns(rhs)
+        return self.system.solve_columns(rhs, self._border.column, self.torque_gradient)
 
     def rows(self, dofs: np.ndarray) -> np.ndarray:
         """Derivatives (m, n_parameters) of any unknowns of the scene, pinned (zero) and driven ones included."""
         kept = self.system.sparsity.kept[dofs]
         out = np.zeros((len(kept), self.system.scene.n_parameters))
         free = (kept >= 0) & (kept < self._n)
-        out[free] = self._rows_of_full(kept[free])
+        out[free] = self.full[kept[free]]
         driven = kept >= self._n
         out[driven] = self._driven_map[kept[driven] - self._n].toarray()
         return out
@@ -86,8 +79,7 @@ class Sensitivities:
         """Derivative (n_parameters,) of the actuation's multiplier, zero without actuation."""
         if self._border is None:
             return np.zeros(self.system.scene.n_parameters)
-        actuated = np.flatnonzero(self.system.constraint)
-        return self.system.constraint[actuated] @ self._unconstrained[actuated] / self._border.schur
+        return -(self._residual_q.T @ self._border.column) / self._border.schur
 
     @cached_property
     def opening_derivative(self) -> tuple[np.ndarray, float]:
@@ -103,7 +95,7 @@ class Sensitivities:
         load = np.zeros(self._n + self.system.sparsity.n_driven)
         np.add.at(load, kept[kept >= 0], np.asarray(cotangent, float)[kept >= 0])
         multiplier, _ = bordered_solve(self.system, self._border, load[: self._n])
-        return -(self._residual_q[: self._n].T @ multiplier) + self._driven_map.T @ load[self._n:]
+        return -(self._residual_q.T @ multiplier) + self._driven_map.T @ load[self._n:]
 
     # -- energies --------------------------------------------------------------------------------------------------
     @cached_property
@@ -120,25 +112,23 @@ class Sensitivities:
         gradient = self._elastic_gradient()
         multiplier, _ = bordered_solve(self.system, self._border, gradient[: self._n])
         return (self._by_parameter(self._energy_L) + self._driven_map.T @ gradient[self._n:]
-                - self._residual_q[: self._n].T @ multiplier)
+                - self._residual_q.T @ multiplier)
 
     @cached_property
     def potential_hessian(self) -> np.ndarray:
         """Exact d2(potential)/dq2 (n_parameters, n_parameters): Pi_qq + Pi_qx x_q."""
-        scene, n = self.system.scene, self._n
+        scene = self.system.scene
         twice = np.zeros(scene.n_parameters)
         factor = scene.length_factor[self._has]
         np.add.at(twice, scene.length_parameter[self._has], factor**2 * self._energy_LL[self._has])
         explicit = np.diag(twice)
         driven = self._driven_map
         if driven.shape[0]:
-            upper = self._coupling[1]
+            upper = self.system.sparsity.driven_columns(self._driven_values)[1]
             block = upper + sp.triu(upper, 1).T
-            lengths_driven = (driven.T @ self._length_residual[n:]).toarray()
+            lengths_driven = (driven.T @ self._lengths_in_driven()).toarray()
             explicit += lengths_driven + lengths_driven.T + (driven.T @ block @ driven).toarray()
-        hessian = explicit + self._residual_q[:n].T @ self._unconstrained
-        if self._border is not None:
-            hessian -= np.outer(self._residual_q[:n].T @ self._border.column, self.torque_gradient)
+        hessian = explicit + self._residual_q.T @ self.full
         return 0.5 * (hessian + hessian.T)
 
     @property
@@ -150,7 +140,7 @@ class Sensitivities:
     def predict(self, dq: np.ndarray, dopening: float = 0.0) -> Start:
         """First-order prediction of the equilibrium at q + dq and opening + dopening: one solve."""
         system, eq = self.system, self.equilibrium
-        rhs = -(self._residual_q[: self._n] @ dq)
+        rhs = -(self._residual_q @ dq)
         step, change = bordered_solve(system, self._border, rhs, dopening if self._border is not None else 0.0)
         kept = np.concatenate([step, self._driven_map @ dq])
         return Start(eq.state.moved(system.increment(step)), eq.torque + float(change),
@@ -164,7 +154,7 @@ class Sensitivities:
             return False
         # columns in uneven shares: in a plain sum those of symmetric parameters could cancel out of the softest mode
         shares = 1.0 + 0.5 * np.sin(np.arange(1, self._residual_q.shape[1] + 1) * 0.7390851)
-        probe = self._residual_q[: self._n] @ shares
+        probe = self._residual_q @ shares
         size = np.abs(probe).max(initial=0.0)
         if size == 0.0:
             return True
@@ -198,22 +188,36 @@ class Sensitivities:
         return np.bincount(scene.length_parameter[has], scene.length_factor[has] * per_element[has],
                            minlength=scene.n_parameters)
 
-    def _assemble_residual_q(self) -> sp.csc_matrix:
-        """R_q (n_kept, n_parameters)."""
-        scene, s, has = self.system.scene, self.system.sparsity, self._has
+    def _differentiate_by_length(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Entries of d(gradient)/d(lengths' parameters): kept rows, parameters, values, one after the other."""
+        scene, has = self.system.scene, self._has
         block = np.einsum("eri,er->ei", self._B[has], self._stress_L[has])
         if scene.weight is not None:
             block += _weight_gradient_per_length(scene, self.equilibrium.state)[has]
-        rows, keep = s.rows[has], s.rows[has] >= 0
+        rows = self.system.sparsity.rows[has]
         columns = np.broadcast_to(scene.length_parameter[has][:, None], rows.shape)
-        values = block * scene.length_factor[has][:, None]
-        shape = (s.n_free + s.n_driven, scene.n_parameters)
-        self._length_residual = sp.csc_matrix((values[keep], (rows[keep], columns[keep])), shape=shape)
-        if not s.n_driven:
-            return self._length_residual
-        free_driven, upper = self._coupling
-        block = sp.vstack([free_driven, upper + sp.triu(upper, 1).T])
-        return (self._length_residual + block @ self._driven_map).tocsc()
+        keep = rows >= 0
+        return rows[keep], columns[keep], (block * scene.length_factor[has][:, None])[keep]
+
+    def _assemble_residual_q(self) -> sp.csc_matrix:
+        """R_q (n_free, n_parameters)."""
+        scene, s = self.system.scene, self.system.sparsity
+        rows, columns, values = self._length_entries
+        if s.n_driven:
+            # the Hessian's columns of driven unknowns, each for the one parameter that drives it
+            driven = s.driven_column
+            rows = np.concatenate([rows, s.indices[s.n_factor_values:]])
+            columns = np.concatenate([columns, scene.driven.parameters[driven]])
+            values = np.concatenate([values, self._driven_values * scene.driven.factors[driven]])
+        free = rows < s.n_free
+        return sp.csc_matrix((values[free], (rows[free], columns[free])), shape=(s.n_free, scene.n_parameters))
+
+    def _lengths_in_driven(self) -> sp.csr_matrix:
+        """d(gradient in the driven unknowns)/d(lengths' parameters) (n_driven, n_parameters)."""
+        rows, columns, values = self._length_entries
+        driven = rows >= self._n
+        return sp.csr_matrix((values[driven], (rows[driven] - self._n, columns[driven])),
+                             shape=(self.system.sparsity.n_driven, self.system.scene.n_parameters))
 
     def _stress_change(self, kept: np.ndarray, dq: np.ndarray) -> np.ndarray:
         """First-order change (E, 6) of the generalised stresses, for an increment of the kept unknowns and of q."""

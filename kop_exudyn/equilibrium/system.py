@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..scene.assembly import ENERGY, GRADIENT, HESSIAN, assemble_rods, predict_stress, scatter_blocks
 from ..scene.scene import Scene
@@ -141,6 +142,13 @@ class System:
         """K^-1 rhs with the factorisation at hand; rhs (n_free,) or (n_free, k)."""
         self.counters.solves += 1 if rhs.ndim == 1 else rhs.shape[1]
         return self.factorisation.solve(rhs)
+
+    def solve_columns(
+        self, rhs: sp.csc_matrix, column: np.ndarray | None = None, shares: np.ndarray | None = None
+    ) -> np.ndarray:
+        """K^-1 rhs - column shares^T (n_free, k) for many sparse right-hand sides rhs (n_free, k)."""
+        self.counters.solves += rhs.shape[1]
+        return self.factorisation.solve_columns(rhs, column, shares)
 
     def multiply(self, v: np.ndarray) -> np.ndarray:
         """K v with the assembled Hessian over the free unknowns."""

@@ -7,6 +7,7 @@ unknowns hold d(gradient)/d(driven), which the sensitivities need.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -54,11 +55,19 @@ class Sparsity:
         n, m = self.n_free, self.n_factor_values
         return sp.csc_matrix((values[:m], self.indices[:m], self.indptr[: n + 1]), shape=(n, n))
 
+    @cached_property
+    def driven_column(self) -> np.ndarray:
+        """Driven unknown of each entry in the driven columns, `values[n_factor_values:]`."""
+        return np.repeat(np.arange(self.n_driven), np.diff(self.indptr[self.n_free:]))
+
     def driven_columns(self, values: np.ndarray) -> tuple[sp.csc_matrix, sp.csc_matrix]:
-        """Hessian blocks free x driven (n_free, n_driven) and upper driven x driven (n_driven, n_driven)."""
+        """Hessian blocks free x driven (n_free, n_driven) and upper driven x driven (n_driven, n_driven).
+
+        values : those of the driven columns, `values[n_factor_values:]`
+        """
         n, m = self.n_free, self.n_driven
         start = self.n_factor_values
-        block = sp.csc_matrix((values[start:], self.indices[start:], self.indptr[n:] - start), shape=(n + m, m))
+        block = sp.csc_matrix((values, self.indices[start:], self.indptr[n:] - start), shape=(n + m, m))
         return block[:n], block[n:]
 
 

@@ -31,7 +31,7 @@ def kept_hessian(system: System) -> np.ndarray:
     n = s.n_free
     upper = np.zeros((n + s.n_driven,) * 2)
     upper[:n, :n] = s.free_matrix(system.values).toarray()
-    block, corner = s.driven_columns(system.values)
+    block, corner = s.driven_columns(system.values[s.n_factor_values:])
     upper[:n, n:], upper[n:, n:] = block.toarray(), corner.toarray()
     return upper + np.triu(upper, 1).T
 

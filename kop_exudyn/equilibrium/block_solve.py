@@ -1,0 +1,147 @@
+"""Many sparse right-hand sides solved together with one sparse L D L^T: what sensitivities spend their time on.
+
+Columns of L with the same pattern (a body's six unknowns) are taken as one panel, so that a row of the work block that
+is loaded once serves six columns; right-hand sides go through in blocks that stay in the second-level cache; and the
+forward pass leaves out panels that no right-hand side of a block has reached (Gilbert and Peierls 1988).
+"""
+from __future__ import annotations
+
+import numba as nb
+import numpy as np
+import scipy.sparse as sp
+
+_PANEL = 6  # most columns of a panel; the inner loops below are written out for it
+_BLOCK = 72  # right-hand sides of a block
+
+
+@nb.njit(cache=True)
+def panels_of(indptr: np.ndarray, indices: np.ndarray) -> np.ndarray:
+    """First columns (n_panels + 1,) of the panels of L: runs of columns with one pattern below them."""
+    n = len(indptr) - 1
+    starts = np.empty(n + 1, np.int64)
+    count, width = 0, _PANEL
+    for j in range(n):
+        # a column's first entry is its parent; one entry less there means that nothing else differs
+        one_less = indptr[j + 1] - indptr[j] == indptr[j] - indptr[j - 1] - 1
+        if width == _PANEL or not one_less or indices[indptr[j - 1]] != j:
+            starts[count] = j
+            count, width = count + 1, 0
+        width += 1
+    starts[count] = n
+    return starts[: count + 1].copy()
+
+
+def solve_columns(
+    L: sp.csc_matrix, pivots: np.ndarray, order: np.ndarray, panels: np.ndarray, rhs: sp.csc_matrix,
+    column: np.ndarray | None = None, shares: np.ndarray | None = None,
+) -> np.ndarray:
+    """A^-1 rhs - column shares^T (n, k) with A = P L D L^T P^T, rhs sparse (n, k), column (n,) and shares (k,)."""
+    n, k = rhs.shape
+    place = np.empty(n, np.int64)
+    place[order] = np.arange(n)
+    out = np.empty((n, k))
+    column, shares = (np.zeros(n), np.zeros(k)) if column is None else (column, shares)
+    _solve_blocks(panels, L.indptr, L.indices, L.data, 1 / pivots, place, rhs.indptr, rhs.indices, rhs.data, column,
+                  shares, out)
+    return out
+
+
+@nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _solve_blocks(panels, indptr, indices, data, inverse, place, rhs_ptr, rhs_rows, rhs_values, column, shares, out):
+    """Blocks of right-hand sides, one after the other: scatter, forward, backward, gather."""
+    n, total = out.shape
+    work, panel = np.empty((n, _BLOCK)), np.empty(_PANEL * _BLOCK)
+    reached = np.empty(len(panels), np.bool_)
+    panel_of = np.empty(n, np.int64)
+    for s in range(len(panels) - 1):
+        panel_of[panels[s]: panels[s + 1]] = s
+    for first in range(0, total, _BLOCK):
+        k = min(_BLOCK, total - first)
+        work[:] = 0.0
+        reached[:] = False
+        for c in range(k):
+            for t in range(rhs_ptr[first + c], rhs_ptr[first + c + 1]):
+                i = place[rhs_rows[t]]
+                work[i, c] += rhs_values[t]
+                reached[panel_of[i]] = True
+        for s in range(len(panels) - 1):
+            if reached[s]:
+                _forward(panels[s], panels[s + 1], indptr, indices, data, panel_of, work, panel, reached)
+        for s in range(len(panels) - 2, -1, -1):
+            _backward(panels[s], panels[s + 1], indptr, indices, data, inverse, work, panel)
+        for i in range(n):
+            row, target, factor = work[place[i]], out[i], column[i]
+            for c in range(k):
+                target[first + c] = row[c] - factor * shares[first + c]
+
+
+@nb.njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
+def _offsets(first, end, indptr):
+    """Where each of the panel's columns has its first entry below the panel; absent columns repeat the last one."""
+    last, w = end - 1, end - first
+    return (indptr[first] + w - 1, indptr[min(first + 1, last)] + max(w - 2, 0),
+            indptr[min(first + 2, last)] + max(w - 3, 0), indptr[min(first + 3, last)] + max(w - 4, 0),
+            indptr[min(first + 4, last)] + max(w - 5, 0), indptr[min(first + 5, last)])
+
+
+@nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _forward(first, end, indptr, indices, data, panel_of, work, panel, reached):
+    """Solve within a panel, then take its columns from all rows below. Absent columns are zero in `panel`."""
+    w = end - first
+    panel[w * _BLOCK:] = 0.0
+    for q in range(w):
+        own, row = panel[q * _BLOCK: (q + 1) * _BLOCK], work[first + q]
+        for c in range(_BLOCK):
+            own[c] = row[c]
+        for p in range(q):
+            v, other = data[indptr[first + p] + q - p - 1], panel[p * _BLOCK: (p + 1) * _BLOCK]
+            for c in range(_BLOCK):
+                own[c] -= v * other[c]
+        for c in range(_BLOCK):
+            row[c] = own[c]
+    below = indptr[end - 1]
+    a0, a1, a2, a3, a4, a5 = _offsets(first, end, indptr)
+    for t in range(indptr[end] - below):
+        i = indices[below + t]
+        reached[panel_of[i]] = True
+        row = work[i]
+        v0, v1, v2, v3, v4, v5 = data[a0 + t], data[a1 + t], data[a2 + t], data[a3 + t], data[a4 + t], data[a5 + t]
+        for c in range(_BLOCK):
+            row[c] -= (v0 * panel[c] + v1 * panel[_BLOCK + c] + v2 * panel[2 * _BLOCK + c]
+                       + v3 * panel[3 * _BLOCK + c] + v4 * panel[4 * _BLOCK + c] + v5 * panel[5 * _BLOCK + c])
+
+
+@nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _backward(first, end, indptr, indices, data, inverse, work, panel):
+    """Divide a panel by its pivots, take all rows below from it, then solve within it."""
+    w = end - first
+    for q in range(w):
+        own, row, v = panel[q * _BLOCK: (q + 1) * _BLOCK], work[first + q], inverse[first + q]
+        for c in range(_BLOCK):
+            own[c] = v * row[c]
+    below = indptr[end - 1]
+    a0, a1, a2, a3, a4, a5 = _offsets(first, end, indptr)
+    m = indptr[end] - below
+    for t in range(0, m, 2):
+        # two rows at once, since storing the panel is what takes longest; an odd last one is taken twice, once times 0
+        u, once = (t + 1, 1.0) if t + 1 < m else (t, 0.0)
+        row, next_row = work[indices[below + t]], work[indices[below + u]]
+        v0, v1, v2, v3, v4, v5 = data[a0 + t], data[a1 + t], data[a2 + t], data[a3 + t], data[a4 + t], data[a5 + t]
+        w0, w1, w2 = once * data[a0 + u], once * data[a1 + u], once * data[a2 + u]
+        w3, w4, w5 = once * data[a3 + u], once * data[a4 + u], once * data[a5 + u]
+        for c in range(_BLOCK):
+            x, y = row[c], next_row[c]
+            panel[c] -= v0 * x + w0 * y
+            panel[_BLOCK + c] -= v1 * x + w1 * y
+            panel[2 * _BLOCK + c] -= v2 * x + w2 * y
+            panel[3 * _BLOCK + c] -= v3 * x + w3 * y
+            panel[4 * _BLOCK + c] -= v4 * x + w4 * y
+            panel[5 * _BLOCK + c] -= v5 * x + w5 * y
+    for q in range(w - 1, -1, -1):
+        own, row = panel[q * _BLOCK: (q + 1) * _BLOCK], work[first + q]
+        for p in range(q + 1, w):
+            v, other = data[indptr[first + q] + p - q - 1], panel[p * _BLOCK: (p + 1) * _BLOCK]
+            for c in range(_BLOCK):
+                own[c] -= v * other[c]
+        for c in range(_BLOCK):
+            row[c] = own[c]

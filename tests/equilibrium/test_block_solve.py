@@ -1,0 +1,49 @@
+"""Many sparse right-hand sides at once against dense solves."""
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from kop_exudyn.equilibrium.block_solve import panels_of
+from kop_exudyn.equilibrium.factorisation import Factorisation
+
+
+def chain(bodies: int, size: int, seed: int) -> sp.csc_matrix:
+    """A positive definite matrix of coupled blocks, in rings of neighbours, as bodies of a structure have."""
+    rng = np.random.default_rng(seed)
+    apart = np.abs(np.subtract.outer(np.arange(bodies), np.arange(bodies)))
+    dense = np.kron(np.isin(apart, (0, 1, 5)), np.ones((size, size))) * rng.normal(size=(bodies * size,) * 2)
+    symmetric = dense + dense.T
+    return sp.csc_matrix(symmetric + np.diag(1 + np.abs(symmetric).sum(axis=1)))
+
+
+@pytest.mark.parametrize("bodies, size, count", [(30, 6, 200), (25, 7, 72), (40, 1, 5), (1, 3, 1), (12, 4, 73)])
+def test_same_as_a_dense_solve(bodies, size, count):
+    matrix = chain(bodies, size, seed=bodies)
+    factorisation = Factorisation()
+    assert factorisation.update(sp.triu(matrix, format="csc")) == 0
+    rng = np.random.default_rng(1)
+    rhs = sp.random(matrix.shape[0], count, density=0.05, random_state=rng, format="csc")
+    column, shares = rng.normal(size=matrix.shape[0]), rng.normal(size=count)
+    expected = np.linalg.solve(matrix.toarray(), rhs.toarray())
+    np.testing.assert_allclose(factorisation.solve_columns(rhs), expected, rtol=1e-10, atol=1e-14)
+    np.testing.assert_allclose(factorisation.solve_columns(rhs, column, shares), expected - np.outer(column, shares),
+                               rtol=1e-10, atol=1e-12)
+
+
+def test_indefinite_matrices_and_no_right_hand_sides():
+    factorisation = Factorisation()
+    matrix = sp.csc_matrix(np.array([[1.0, 2, 0], [2, 1, 1], [0, 1, 3]]))
+    assert factorisation.update(sp.triu(matrix, format="csc")) == 1
+    np.testing.assert_allclose(matrix @ factorisation.solve_columns(sp.identity(3, format="csc")), np.eye(3), atol=1e-12)
+    assert factorisation.solve_columns(sp.csc_matrix((3, 0))).shape == (3, 0)
+
+
+def test_panels_are_columns_of_one_pattern():
+    dense = np.tril(np.ones((9, 9)), -1)
+    L = sp.csc_matrix(dense)
+    assert panels_of(L.indptr, L.indices).tolist() == [0, 6, 9]
+    dense[5, 2] = 0.0  # column 2 now has an entry less than its neighbours say
+    L = sp.csc_matrix(dense)
+    assert panels_of(L.indptr, L.indices).tolist()[:3] == [0, 2, 3]
