@@ -10,8 +10,8 @@ from .system import System
 
 _SHIFT_START = 1e-6  # of the median rotational stiffness; a soft mode of a large structure is about that soft
 _SHIFT_GROWTH = 8.0
-# Just enough of a shift leaves the softest mode so soft that the step overshoots along it: released umbrella meshes then
-# take 60 to 80 iterations, with the margin 25 to 50. Flat starts of actuated scenes have to leave along that mode.
+# Just enough of a shift leaves the softest mode so soft that the step overshoots along it: released umbrella meshes
+# then take 60 to 80 iterations, with the margin 25 to 50. Flat starts of actuated scenes have to leave along that mode.
 _SHIFT_MARGIN = 4.0
 _MAX_SHIFTS = 40
 
