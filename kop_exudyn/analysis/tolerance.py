@@ -7,7 +7,7 @@ P J diag(s^2) J^T P^T, with P the projection off infinitesimal rigid motions. Sa
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Mapping
+from typing import Any, Mapping, Sequence
 
 import numpy as np
 
@@ -130,7 +130,7 @@ def sample_spread(design: Design, evaluation: Evaluation, tolerance: Tolerance, 
     return samples
 
 
-def sampled_spread(samples: list[Sample], diagonal: float) -> Spread:
+def sampled_spread(samples: Sequence[Sample], diagonal: float) -> Spread:
     """Root mean square displacements over the samples that were found. Raises SimulationFailure when none was."""
     found = [sample.displacements for sample in samples if sample.displacements is not None]
     if not found:
@@ -138,7 +138,7 @@ def sampled_spread(samples: list[Sample], diagonal: float) -> Spread:
     return Spread(np.sqrt(np.mean(np.sum(np.square(found), axis=2), axis=0)), diagonal)
 
 
-def predicted_displacements(design: Design, evaluation: Evaluation, samples: list[Sample]) -> np.ndarray:
+def predicted_displacements(design: Design, evaluation: Evaluation, samples: Sequence[Sample]) -> np.ndarray:
     """(number, n, 3) first-order displacements for the samples' own errors: the sampling's noise is in both."""
     J = joint_jacobian(design, evaluation)
     return np.stack([(J @ sample.errors).reshape(-1, 3) for sample in samples])
@@ -151,3 +151,39 @@ def _rigid_motions(x: np.ndarray) -> np.ndarray:
     columns = [np.tile(axis, (len(x), 1)) for axis in np.eye(3)] + [np.cross(axis, arms / size) for axis in np.eye(3)]
     u, s, _ = np.linalg.svd(np.stack([c.ravel() for c in columns], axis=1), full_matrices=False)
     return u[:, s > 1e-9 * s[0]]
+
+
+def relative_tolerance(design: Design, share: float, angle: float) -> Tolerance:
+    """Lengths uncertain by a share of the design's median length, angles by so many rad."""
+    lengths = [design.parameters[group.indices].ravel() for group in design.groups if not part_kind(group.kind).angular]
+    return Tolerance(share * float(np.median(np.concatenate(lengths))) if lengths else 0.0, angle)
+
+
+def robustness(design: Design, evaluation: Evaluation, tolerance: Tolerance, factors: Sequence[float], number: int,
+               seed: int = 0) -> dict[str, Any]:
+    """What errors of several sizes do to a design, by sensitivities and by sampling; plain data.
+
+    factors : multiples of the tolerance; number : samples for each
+    Of each size: root mean square and worst joint's displacement, predicted and sampled; `linear_error`, the part of
+    the sampled displacements that their own prediction misses; the fit's largest deviations; how many samples failed.
+    """
+    sizes = []
+    for factor in factors:
+        scaled = tolerance.scaled(factor)
+        predicted = predicted_spread(design, evaluation, scaled)
+        samples = sample_spread(design, evaluation, scaled, number, seed)
+        found = [sample for sample in samples if sample.displacements is not None]
+        entry = {"factor": factor, "predicted_rms_percent": predicted.rms_percent,
+                 "predicted_worst_percent": predicted.worst_percent, "samples": number, "failed": number - len(found)}
+        if found:
+            sampled = sampled_spread(samples, evaluation.fit.diagonal)
+            moved = np.stack([sample.displacements for sample in found])
+            missed = np.linalg.norm(moved - predicted_displacements(design, evaluation, found))
+            entry |= {"sampled_rms_percent": sampled.rms_percent, "sampled_worst_percent": sampled.worst_percent,
+                      "linear_error": float(missed / np.linalg.norm(moved)),
+                      "max_percent": [sample.max_percent for sample in found]}
+        sizes.append(entry)
+    return {"design": design.name, "elements": design.n_elements, "length": tolerance.length, "angle": tolerance.angle,
+            "planned_max_percent": evaluation.fit.max_percent, "shares": dict(shares_by_kind(design, evaluation, tolerance)),
+            "joints_percent": 100 * predicted_spread(design, evaluation, tolerance).joints / evaluation.fit.diagonal,
+            "sizes": sizes}

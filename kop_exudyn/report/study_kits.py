@@ -49,19 +49,23 @@ def three_classes(models: Path, quick: bool = False) -> list[KitCase]:
 
 
 def kits(study: Study, models: Path) -> dict[str, KitResult]:
-    """The kits of the three classes by name; quick studies keep their runs in their own folder."""
+    """The kits of the three classes by name."""
+    return {case.name: kit_of(case, run_folder(case, study), study.jobs) for case in three_classes(models, study.quick)}
+
+
+def run_folder(case: KitCase, study: Study) -> Path:
+    """Where the run of a case is kept: beside all reports; quick studies keep it in their own folder."""
     runs = study.out / "runs" if study.quick else study.out.parent / "runs"
-    return {case.name: kit_of(case, runs, study.jobs) for case in three_classes(models, study.quick)}
+    return runs / case.name.replace(" ", "_")
 
 
-def kit_of(case: KitCase, runs: Path, jobs: int) -> KitResult:
-    """The kit of a case: a finished run of the same job in `runs`, or a new run, which goes on from checkpoints there.
+def kit_of(case: KitCase, folder: Path, jobs: int) -> KitResult:
+    """The kit of a case: a finished run of the same job in its folder, or a new run, which goes on from checkpoints there.
 
     A run that was read back has no events. Raises InputError and SimulationFailure as `optimize_kit` does.
     """
     designs, files = load_designs(case.folder, case.number), case.files
     settings = JobSettings(stages=case.stages, jobs=jobs)
-    folder = runs / case.name.replace(" ", "_")
     record = folder / "checkpoints" / "job.json"
     job = Job.of(described_job(designs, case.parts, settings), files)
     same = record.exists() and Job.load(record).difference(job) is None

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from kop_exudyn.analysis.tolerance import (
-    Tolerance, joint_jacobian, predicted_displacements, predicted_spread, sample_spread, sampled_spread,
-    shares_by_kind)
+    Tolerance, joint_jacobian, predicted_displacements, predicted_spread, relative_tolerance, robustness,
+    sample_spread, sampled_spread, shares_by_kind)
 from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.optimize.objective import DesignObjective
 from kop_exudyn.structures.base import design_from_dict
@@ -76,3 +76,15 @@ def test_failures_are_samples(built):
 def test_bad_tolerances_are_named():
     with pytest.raises(InputError, match="length"):
         Tolerance(length=-1.0, angle=0.0)
+
+
+def test_robustness_is_plain_and_tells_agreement_and_failures(built):
+    design, evaluation = built
+    found = robustness(design, evaluation, relative_tolerance(design, 1e-4, 1e-4), (1, 30), 4)
+    small, large = found["sizes"]
+    lengths = [design.parameters[group.indices].ravel() for group in design.groups if group.kind == "linear"]
+    assert found["length"] == 1e-4 * np.median(np.concatenate(lengths))
+    assert small["linear_error"] < 0.02 < large["linear_error"] and small["failed"] == 0
+    assert large["predicted_rms_percent"] == pytest.approx(30 * small["predicted_rms_percent"])
+    assert len(found["joints_percent"]) == len(design.joints)
+    assert robustness(design, evaluation, Tolerance(5.0, 0.0), (1,), 2)["sizes"][0]["failed"] == 2
