@@ -6,9 +6,10 @@ import sys
 from pathlib import Path
 
 HELP = "write cut lists, cut sheets, assembly plans and 3D files of a finished kit"
-DESCRIPTION = """Reads the folder that `kop optimize` wrote, and writes two folders: workshop (cut list, bills, assembly plans as
-CSV; cut sheets and corner templates at true scale as SVG, and DXF with the extra [fab]) and desk (the assigned designs'
-states as OBJ centre lines, PLY and GLB solids, VTU with strains and stresses, and tables as CSV)."""
+DESCRIPTION = """Reads the folder that `kop optimize` wrote, and writes two folders: workshop (cut list, bills and assembly plans as
+CSV; labelled assembly drawings as SVG and PDF; cut sheets and corner templates at true scale as SVG, and DXF with the
+extra [fab]) and desk (the assigned designs' states as OBJ centre lines, PLY and GLB solids, VTU with strains, stresses
+and utilisation, and tables as CSV)."""
 EXAMPLES = """examples:
   kop export out/kit models/conformals --out out/files --unit m"""
 
@@ -24,22 +25,17 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from importlib.util import find_spec
 
-    from ..errors import InputError
     from ..io.export import export_desk, export_workshop
     from ..io.pieces import parts_list_of
     from ..io.designs import load_designs
-    from ..io.results import load_result
     from ..io.saved_runs import load_run
+    from ..report.assembly_drawing import save_assembly_drawings
 
-    names = [entry["name"] for entry in load_result(args.result / "result.json")["designs"]]
-    known = {design.name: design for design in load_designs(args.folder)}
-    missing = [name for name in names if name not in known]
-    if missing:
-        raise InputError("holds no design of this name", source=args.folder, field="name", value=missing[0])
-    result = load_run(args.result, [known[name] for name in names])
+    result = load_run(args.result, load_designs(args.folder))
     sheets = ["svg"] + (["dxf"] if find_spec("ezdxf") else [])
     done = export_workshop(parts_list_of(result), args.out / "workshop", args.unit, formats=sheets,
                            overwrite=args.overwrite)
+    done += save_assembly_drawings(result, args.out / "workshop", overwrite=args.overwrite)
     done += export_desk(result, args.out / "desk", overwrite=args.overwrite)
     sys.stdout.write(f"{len(done)} files in {args.out}\n")
     return 0

@@ -6,22 +6,44 @@ along the other one; corners carry their part's label, with "-" where they are b
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from ..analysis.kit_result import KitResult
 from ..io.colours import part_colours
-from ..io.pieces import PartsList, Piece
+from ..io.export import file_stem
+from ..io.files import make_folder
+from ..io.pieces import PartsList, Piece, parts_list_of
 from ..io.placement import PlacedPieces
 from ..kit.kinds import part_kind
+from ..optimize.objective import Evaluation
 from ..scene.state import State
-from .style import FAINT, INK, QUIET, style
+from .style import FAINT, INK, QUIET, save_figure, style
 
 _SIDE_ROOM = 0.42  # inches that the median side is long on paper: room for its label
 _LEAST, _MOST = 8.0, 45.0  # inches of the drawing's longer side
 _MARGIN = 0.6  # inches
+
+
+def save_assembly_drawings(result: KitResult, folder: str | Path, *, suffixes: Sequence[str] = ("svg", "pdf"),
+                           overwrite: bool = False) -> list[Path]:
+    """Write assembly_DESIGN.svg and .pdf for every design of a result; returns their paths.
+
+    Drawn in the assembled state where the design has one, as it is built from the kit; the input design's state stands in
+    where no equilibrium of the assigned design was found. Raises InputError when a file can't be written.
+    """
+    parts, folder, done = parts_list_of(result), make_folder(folder), []
+    for design, reference, outcome in zip(result.designs, result.references, result.stages["assigned"].designs):
+        role = next((role.name for role in design.roles if not role.fitted), design.fitted_role.name)
+        found = outcome if isinstance(outcome, Evaluation) else reference
+        figure = draw_assembly(parts, design.name, found.equilibria[role].state, role)
+        done += save_figure(figure, folder / f"assembly_{file_stem(design.name)}", suffixes, overwrite=overwrite)
+    return done
 
 
 @dataclass(frozen=True)

@@ -114,12 +114,15 @@ def final_states(result: KitResult) -> dict[tuple[str, str, str], Equilibrium]:
 
 
 def remarks(result: KitResult) -> list[str]:
-    """What a reader should know besides the figures: snaps, other states that designs open into, why SQPs stopped."""
+    """What a reader should know besides the figures: snaps, other states that designs open into, rods that yield, why SQPs
+    stopped.
+    """
     stages = result.stages
     found = [f"{jump.design} snapped at {jump.fraction:.0%} of the way to its parts: {jump.distance:.1%} of its size."
              for jump in stages["assigned"].jumps]
     found += [_about_opening(design.name, result.redeployment(n), result.summary("assigned", n))
               for n, design in enumerate(result.designs) if result.redeployed]
+    found += [_about_strength(design.name, result.summary("assigned", n)) for n, design in enumerate(result.designs)]
     found = [remark for remark in found if remark]
     return found + [f"The {name} stage ended after {stage.steps} steps: {stage.status}."
                     for name, stage in stages.items() if stage.status]
@@ -135,6 +138,14 @@ def _about_opening(name: str, opened: Mapping, kept: Mapping) -> str:
     return (f"{name} has several stable states: opened from its assembly without guidance it settles "
             f"{opened['moved_percent']:.1f} % of its size from the one shown, at {ratio:.3f} times its elastic energy "
             f"({opened['fit']['max_percent']:.2f} % from the target at most); it has to be led into the one shown.")
+
+
+def _about_strength(name: str, summary: Mapping) -> str:
+    """A sentence where rods of an assigned design are stressed beyond their elastic limit."""
+    beyond = [f"{strength['utilisation']:.2f} times in its {role} state" for role, strength in
+              summary.get("strength", {}).items() if (strength["utilisation"] or 0) > 1]
+    return (f"{name}'s rods are stressed beyond their elastic limit, {' and '.join(beyond)}: they would yield or break; "
+            "thinner ones are stressed less.") if beyond else ""
 
 
 def _fit(summary: Mapping, name: str) -> float | None:

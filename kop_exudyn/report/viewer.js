@@ -142,7 +142,14 @@
   function redraw() {
     if (queued) return;
     queued = true;
-    requestAnimationFrame(() => { queued = false; layOut(); draw(); root.dataset.drawn = String(1 + Number(root.dataset.drawn || 0)); });
+    requestAnimationFrame(() => { queued = false; paint(); });
+  }
+
+  function paint() {
+    layOut();
+    draw();
+    root.dataset.drawn = String(1 + Number(root.dataset.drawn || 0));
+    root.dataset.firstDrawn ??= String(Math.round(performance.now()));  // ms from the page's request
   }
 
   function pick(x, y) {
@@ -192,7 +199,7 @@
       bar.style.background = `linear-gradient(90deg, ${scene.scale.map(css).join(",")})`;
       ticks.className = "ticks";
       for (let k = 0; k <= 4; k++) ticks.append(Object.assign(document.createElement("span"), {textContent: `${k === 4 && beyond ? "≥ " : ""}${Number((limit * k / 4).toPrecision(3))}`}));
-      const title = {deviation: "distance from the target, % of its box diagonal", utilisation: "stress over elastic limit"}[chosen.colour];
+      const title = {deviation: "distance from the target, % of its box diagonal", utilisation: "stress as a share of the elastic limit; above 1 it yields"}[chosen.colour];
       box.append(Object.assign(document.createElement("p"), {textContent: title}), bar, ticks);
       if (!shown().some(d => d.drawn?.[chosen.colour])) box.append(Object.assign(document.createElement("p"), {className: "quiet", textContent: "not known for this stage"}));
     }
@@ -273,7 +280,7 @@
                    "+": () => zoom(1.15), "-": () => zoom(1 / 1.15), Home: home, Escape: () => choose({part: -1})}[e.key];
       if (act) { e.preventDefault(); act(); }
     });
-    new ResizeObserver(redraw).observe(canvas);
+    new ResizeObserver(paint).observe(canvas);  // before the browser paints: the last drawing would be stretched
     $("target").onchange = e => choose({target: e.target.checked});
     $("opening").oninput = e => choose({opening: Number(e.target.value)});
     $("home").onclick = home;

@@ -119,8 +119,9 @@ class _Drawing:
                 found.append(self._state(stage, role, equilibrium))
                 continue
             fit = self.fitting(equilibrium.state.positions[self.design.joints])
-            note = f"max {fit.max_percent:.2g} %, mean {fit.mean_percent:.2g} %"
-            found.append(replace(self._state(stage, role, equilibrium, fit.placement), note=note))
+            state = self._state(stage, role, equilibrium, fit.placement)
+            off = f"off target: max {fit.max_percent:.2g} %, mean {fit.mean_percent:.2g} %"
+            found.append(replace(state, note=" · ".join(filter(None, (off, state.note)))))
             path = opening_path(self.design, equilibrium, role, frames) if frames else ()
             found += [replace(self._state(stage, role, eq, fit.placement), final=False) for eq in path]
         return found
@@ -164,9 +165,11 @@ class _Drawing:
             distances = np.sqrt(self.surface.closest(x).squared_distances)
             deviation = 100 * distances[nodes] / self.design.target.diagonal
         strength = design_strength(self.design, {role: equilibrium})[role]
-        utilisation = None if strength.largest is None else _ring_values(scene, strength.utilisation)
+        known = strength.largest is not None
+        utilisation = _ring_values(scene, strength.utilisation) if known else None
+        note = f"stress: max {100 * strength.largest:.0f} % of its limit" if known else ""
         return ViewerState(stage, role, x[nodes], R[nodes], joints, corners, deviation, utilisation,
-                           equilibrium.opening, placed=placement is not None)
+                           equilibrium.opening, placed=placement is not None, note=note)
 
 
 def _target_near(target: Target) -> tuple[np.ndarray, np.ndarray]:
@@ -195,4 +198,4 @@ def _ring_values(scene: Scene, values: np.ndarray) -> np.ndarray:
 def _dimensions(kind: PartKind, values: np.ndarray) -> str:
     if kind.angular:
         return ", ".join(f"{np.degrees(v):.2f}°" for v in values)
-    return ", ".join(f"{name} {v:.4g}" for name, v in zip(kind.parameter_names, values))
+    return ", ".join(f"{name} = {v:.4g}" for name, v in zip(kind.parameter_names, values))
