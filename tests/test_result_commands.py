@@ -52,7 +52,8 @@ def test_view_shows_all_stages_and_the_way_to_the_opening(run, tmp_path, capsys)
         assert stages == {"input", "direct", "unrelaxed", "relaxed", "assigned"}
         assert sum(not state["final"] for state in design["states"]) == 2
         notes = [state["note"] for state in design["states"] if state["role"] == "deployed" and state["final"]]
-        assert all(re.fullmatch(r"off target: max .* %, mean .* % · stress: max \d+ % of its limit", note) for note in notes)
+        wanted = r"off target: max .* %, mean .* % · stress: max \d+ % of its limit"
+        assert all(re.fullmatch(wanted, note) for note in notes)
 
 
 def test_the_page_of_a_read_run_is_that_of_the_run(run):

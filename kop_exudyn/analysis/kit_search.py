@@ -1,35 +1,31 @@
 """Kits for sweeps: found from scratch or from a neighbouring kit, and told as plain data."""
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any, Mapping, Sequence
 
 import numpy as np
 
 from ..errors import SimulationFailure
-from ..kit.cluster import cluster
+from ..kit.cluster import Clustering, cluster
 from ..kit.parts import Assignment, Kit
 from ..optimize.dataset import Dataset
-from ..optimize.objective import Evaluation, Weights
+from ..optimize.objective import Weights
 from ..optimize.pool import DesignPool
 from ..optimize.rounds import in_rounds
 from ..optimize.stages import StageResult, Stages, StageSettings
 from ..structures.base import Design
 from .kit_result import summary_of
 
-_WARM_DECADES = 2  # of the schedule of w_c: relaxed elements of a neighbouring kit are in clusters already
-
-
 def find_kit(designs: Sequence[Design], parts: Mapping[str, int], stages: StageSettings = StageSettings(),
              start: Sequence[Sequence[float]] | None = None, jobs: int = 1) -> dict[str, Any]:
     """A kit of that many parts a kind by the relaxed and the assigned stage, as plain data.
 
-    start : by design, relaxed elements (nq,) of a neighbouring kit: the relaxed stage begins there, with the last
-        values of w_c only. Default: the input elements and all values
+    start : by design, the elements (nq,) that a neighbouring kit realises. They are clustered anew, and the assigned
+        stage begins there: elements that fit a few more or a few less parts need not be relaxed once more
 
     Returns
     kit : kind -> parts; pieces : by design, kind -> how many of each part it uses
-    relaxed : by design (nq,) elements at the end of the relaxed stage
+    realised : by design (nq,), the elements made of the kit's parts; assignment : see `Assignment.to_dict`
     designs : by design, its name, number of elements and `summary_of`
     objective : J, None where a design failed; equilibria : solved in all
 
@@ -39,14 +35,8 @@ def find_kit(designs: Sequence[Design], parts: Mapping[str, int], stages: StageS
         pool.prepare()
         dataset = Dataset.of_pool(pool, Weights(fit=max(design.fit_weight for design in designs)))
         search = Stages(dataset, parts, stages)
-        evaluations = search.inputs()
-        if start is not None:
-            evaluations = _followed(dataset, evaluations, np.concatenate(list(start)), stages.path_steps)
-            search = Stages(dataset, parts, replace(stages, schedule=search.settings.schedule[-_WARM_DECADES:]))
-        q = np.concatenate([evaluation.q for evaluation in evaluations])
-        kit = cluster(dataset.groups, q, parts, bounds=stages.bounds, restarts=stages.restarts, seed=stages.seed).kit
-        relaxed, at_parts = search.to_parts(search.relaxed(kit, evaluations))
-        return _plain(dataset, relaxed, in_rounds(search, at_parts))
+        at_parts = _from_inputs(search) if start is None else _from_neighbour(search, np.concatenate(list(start)))
+        return _plain(dataset, in_rounds(search, at_parts))
 
 
 def pieces_by_design(designs: Sequence[Design], kit: Kit, assignment: Assignment) -> list[dict[str, list[int]]]:
@@ -60,18 +50,32 @@ def pieces_by_design(designs: Sequence[Design], kit: Kit, assignment: Assignment
     return found
 
 
-def _followed(dataset: Dataset, start: Sequence[Evaluation], q: np.ndarray, steps: int) -> list[Evaluation]:
-    """The designs at other elements q, reached on the straight path; those that fail on it stay at the start."""
-    paths = dataset.follow(q, start, steps)
-    return [first if isinstance(path, SimulationFailure) else path[-1] for first, path in zip(start, paths)]
+def _from_inputs(search: Stages) -> StageResult:
+    """The state at the parts after the relaxed stage."""
+    return search.to_parts(search.relaxed(_clustered(search, search.q0).kit))[1]
 
 
-def _plain(dataset: Dataset, relaxed: StageResult, assigned: StageResult) -> dict[str, Any]:
+def _from_neighbour(search: Stages, q: np.ndarray) -> StageResult:
+    """The designs led to the elements of another kit, and from there to the parts that suit these best."""
+    inputs = search.inputs()
+    paths = search.dataset.follow(q, inputs, search.settings.path_steps)
+    start = [first if isinstance(path, SimulationFailure) else path[-1] for first, path in zip(inputs, paths)]
+    found = _clustered(search, np.concatenate([evaluation.q for evaluation in start]))
+    return search.confirmed(search.built_from(found.kit, found.assignment, start))
+
+
+def _clustered(search: Stages, q: np.ndarray) -> Clustering:
+    settings = search.settings
+    return cluster(search.dataset.groups, q, search.parts, bounds=settings.bounds, restarts=settings.restarts,
+                   seed=settings.seed)
+
+
+def _plain(dataset: Dataset, assigned: StageResult) -> dict[str, Any]:
+    realised = dataset.split(assigned.assignment.matrix(assigned.kit) @ assigned.kit.vector)
     designs = [{"name": design.name, "elements": design.n_elements, **summary_of(outcome, design, reference)}
                for design, outcome, reference in zip(dataset.designs, assigned.designs, dataset.references)]
     return {
-        "kit": assigned.kit.to_dict(),
-        "pieces": pieces_by_design(dataset.designs, assigned.kit, assigned.assignment),
-        "relaxed": [evaluation.q for evaluation in relaxed.designs],
+        "kit": assigned.kit.to_dict(), "assignment": assigned.assignment.to_dict(),
+        "pieces": pieces_by_design(dataset.designs, assigned.kit, assigned.assignment), "realised": realised,
         "designs": designs, "objective": assigned.value, "equilibria": dataset.tally.equilibria,
     }

@@ -1,7 +1,7 @@
 """A deployed design under loads: held at its supports, with its own weight and forces on joints.
 
-The supports hold joints where the unloaded state has them, free to turn, instead of what fixes the free design in space;
-so without loads nothing changes. What opens the design (the mean opening angle of C-shells, an umbrella mesh's
+The supports hold joints where the unloaded state has them, free to turn, instead of what fixes the free design in
+space; so without loads nothing changes. What opens the design (the mean opening angle of C-shells, an umbrella mesh's
 actuators) stays as it is. Loads grow in equal steps, so that the state is the one that the unloaded one deforms into.
 """
 from __future__ import annotations
@@ -92,8 +92,9 @@ def loaded_state(design: Design, unloaded: Equilibrium, case: LoadCase) -> Loade
         raise failure.within(f"{design.name}: under its loads") from None
     found = replace(found, state=confirmation.state)
     moved = scene.node_poses(found.state)[0] - scene.node_poses(unloaded.state)[0]
-    return LoadedState(case, supports, _total_force(scene, unloaded), moved, design.target.diagonal, found, confirmation,
-                       rod_strength(scene, found, materials_of(design)), design.report_positions(found.state))
+    return LoadedState(case, supports, _total_force(scene, unloaded), moved, design.target.diagonal, found,
+                       confirmation, rod_strength(scene, found, materials_of(design)),
+                       design.report_positions(found.state))
 
 
 def supports_of(design: Design, unloaded: Equilibrium, case: LoadCase) -> np.ndarray:

@@ -95,9 +95,9 @@ def materials_of(design: Design) -> tuple[Material, ...]:
 
 
 def material_values(scene: Scene, materials: Sequence[Material], name: str, choose: Callable = np.fmax) -> np.ndarray:
-    """(E,) a property of every rod element's material, NaN where unknown: that of the material that explains its stiffness.
+    """(E,) a property of every rod element's material, the one that explains its stiffness; NaN where unknown.
 
-    choose : which one, where several materials do
+    choose : which value, where several materials do
     """
     values = np.full(len(scene.elements), np.nan)
     for section, elements in _by_section(scene):

@@ -20,9 +20,10 @@ EXAMPLES = """examples:
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("design", type=Path, metavar="DESIGN", help="design file (.json or .json.gz)")
-    parser.add_argument("--gravity", nargs="?", type=gravity, const=gravity("9.81"), metavar="G", help="let the rods' weight "
-                        "act: an acceleration down the z axis (default: 9.81, for lengths in metres) or a vector X,Y,Z, "
-                        "in the design's units; instead of the design file's gravity. Materials need a density")
+    parser.add_argument("--gravity", nargs="?", type=gravity, const=gravity("9.81"), metavar="G",
+                        help="let the rods' weight act: an acceleration down the z axis (default: 9.81, for lengths in "
+                        "metres) or a vector X,Y,Z, in the design's units; instead of the design file's gravity. "
+                        "Materials need a density")
     parser.add_argument("--json", action="store_true", help="print JSON for other programs, joint positions included; "
                         "of a simulation that fails, the design's name and the reason")
 
@@ -73,8 +74,9 @@ def _summary(result: dict) -> str:
 def _under_load(loaded: dict) -> dict[str, str]:
     """Rows about the loaded state."""
     deflection = loaded["deflection"]
+    force = ", ".join(f"{component:.4g}" for component in loaded["total_force"])
     return {
-        "load": f"({', '.join(f'{f:.4g}' for f in loaded['total_force'])}) in all, held at {len(loaded['supports'])} joints",
+        "load": f"({force}) in all, held at {len(loaded['supports'])} joints",
         "deflection": f"max {deflection['max']:.3g} ({deflection['max_percent']:.3g} % of the diagonal), "
                       f"mean {deflection['mean']:.3g} ({deflection['mean_percent']:.3g} %)",
         "stress, loaded": _stress(loaded["strength"]),

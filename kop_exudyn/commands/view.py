@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from ..report.viewer import ViewerScene
 
 HELP = "write a page that shows a finished kit, or a deployed design, in 3D"
-DESCRIPTION = """Writes one self-contained HTML page with an orbitable 3D view; it needs no network. Of a result (the folder
-that `kop optimize` wrote, with the folder of its designs): all designs in all stages, rods with their true sections,
+DESCRIPTION = """Writes one self-contained HTML page with an orbitable 3D view; it needs no network. Of a result (the
+folder that `kop optimize` wrote, with the folder of its designs): all designs in all stages, rods with their true sections,
 coloured by part, deviation or utilisation, and where each part is used. Of a design file: that design, deployed. Both
 with the target surface and a slider for the opening."""
 EXAMPLES = """examples:

@@ -34,8 +34,8 @@ def save_assembly_drawings(result: KitResult, folder: str | Path, *, suffixes: S
                            overwrite: bool = False) -> list[Path]:
     """Write assembly_DESIGN.svg and .pdf for every design of a result; returns their paths.
 
-    Drawn in the assembled state where the design has one, as it is built from the kit; the input design's state stands in
-    where no equilibrium of the assigned design was found. Raises InputError when a file can't be written.
+    Drawn in the assembled state where the design has one, as it is built from the kit; the input design's state stands
+    in where no equilibrium of the assigned design was found. Raises InputError when a file can't be written.
     """
     parts, folder, done = parts_list_of(result), make_folder(folder), []
     for design, reference, outcome in zip(result.designs, result.references, result.stages["assigned"].designs):

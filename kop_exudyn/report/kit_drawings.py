@@ -114,9 +114,7 @@ def final_states(result: KitResult) -> dict[tuple[str, str, str], Equilibrium]:
 
 
 def remarks(result: KitResult) -> list[str]:
-    """What a reader should know besides the figures: snaps, other states that designs open into, rods that yield, why SQPs
-    stopped.
-    """
+    """What a reader should know besides the figures: snaps, other states that designs open into, yield, ends of SQPs."""
     stages = result.stages
     found = [f"{jump.design} snapped at {jump.fraction:.0%} of the way to its parts: {jump.distance:.1%} of its size."
              for jump in stages["assigned"].jumps]
@@ -144,8 +142,8 @@ def _about_strength(name: str, summary: Mapping) -> str:
     """A sentence where rods of an assigned design are stressed beyond their elastic limit."""
     beyond = [f"{strength['utilisation']:.2f} times in its {role} state" for role, strength in
               summary.get("strength", {}).items() if (strength["utilisation"] or 0) > 1]
-    return (f"{name}'s rods are stressed beyond their elastic limit, {' and '.join(beyond)}: they would yield or break; "
-            "thinner ones are stressed less.") if beyond else ""
+    return (f"{name}'s rods are stressed beyond their elastic limit, {' and '.join(beyond)}: they would yield or "
+            "break; thinner ones are stressed less.") if beyond else ""
 
 
 def _fit(summary: Mapping, name: str) -> float | None:

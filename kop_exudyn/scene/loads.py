@@ -162,7 +162,8 @@ def with_self_weight(scene: Scene, density: Any, gravity: Any, areas: Any = None
         density, areas = (np.broadcast_to(np.asarray(values, float), n) for values in (density, areas))
         gravity = np.broadcast_to(np.asarray(gravity, float), 3)
     except ValueError:
-        raise InputError(f"expected one density and area or {n}, and gravity of three components", field="loads") from None
+        raise InputError(f"expected one density and area or {n}, and gravity of three components",
+                         field="loads") from None
     positive = all(((values > 0) & np.isfinite(values)).all() for values in (density, areas))
     if not (positive and np.isfinite(gravity).all()):
         raise InputError("density and areas must be positive, gravity finite", field="loads")

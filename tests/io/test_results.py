@@ -52,7 +52,8 @@ def test_other_formats_are_told_apart(write_json_file):
 def test_states_round_trip(tmp_path):
     generator = np.random.default_rng(1)
     state = State(generator.random((3, 3)), generator.random((3, 3, 3)), generator.random(2))
-    equilibrium = Equilibrium(state, generator.random(4), 0.5, 0.25, generator.random((2, 6)), 1.0, 1.0, 3, 1e-12, 0, 0.1)
+    equilibrium = Equilibrium(state, generator.random(4), 0.5, 0.25, generator.random((2, 6)), 1.0, 1.0, 3, 1e-12, 0,
+                              0.1)
     found = load_states(save_states(tmp_path / "states.npz", {("a shape", "assigned", "deployed"): equilibrium}))
     arrays = found["a shape", "assigned", "deployed"]
     assert sorted(arrays) == ["angles", "parameters", "positions", "rotations", "torque"]

@@ -5,11 +5,14 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
+from html import unescape
 
 import numpy as np
 import pytest
 
 from kop_exudyn.analysis.kit_result import KitResult
+from kop_exudyn.io.designs import load_designs
 from kop_exudyn.optimize.job import JobSettings, run_job
 from kop_exudyn.optimize.stages import StageSettings
 from kop_exudyn.report.viewer import (
@@ -149,11 +152,13 @@ def test_a_single_design_without_parts(result):
 browser = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
 
 
-def run_chromium(page, tmp_path, *options):
+def run_chromium(page, tmp_path, *options, budget=3000):
+    """budget : ms of the page's own time, which goes by at once; None: real time."""
+    limit = [] if budget is None else [f"--virtual-time-budget={budget}"]
     return subprocess.run(
         [CHROMIUM, "--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
          "--enable-unsafe-swiftshader", "--disable-background-networking", "--window-size=900,600",
-         f"--user-data-dir={tmp_path / 'profile'}", "--virtual-time-budget=3000", *options, page],
+         f"--user-data-dir={tmp_path / 'profile'}", *limit, *options, page],
         capture_output=True, text=True, timeout=120)
 
 
@@ -216,3 +221,66 @@ def test_a_click_highlights_the_part(kit_page, tmp_path):
         if len(found) >= 3:
             break
     assert len(found) >= 3 and set(found) <= {f"{p.label}/{p.label}" for p in kit_page.parts}
+
+
+@browser
+def test_the_slider_opens_the_designs(kit_page, tmp_path):
+    """Moved to three openings, it says so, redraws, and keeps the opening in the address."""
+    moves = """<script>addEventListener("load", () => setTimeout(() => {
+      const slider = document.getElementById("opening"), found = [];
+      for (const value of ["0", "0.25", "1"]) {
+        slider.value = value;
+        slider.dispatchEvent(new Event("input"));
+        found.push([document.getElementById("opening-value").textContent,
+                    new URLSearchParams(location.hash.slice(1)).get("opening")]);
+      }
+      document.body.dataset.found = JSON.stringify(found);
+    }, 300));</script>"""
+    page = re.sub(r"<meta http-equiv=.*?>", "", viewer_page(kit_page)).replace("</body>", moves + "</body>")
+    path = tmp_path / "moved.html"
+    path.write_text(page, encoding="utf-8")
+    done = run_chromium(f"{path.as_uri()}#design=0&role=deployed", tmp_path, "--dump-dom")
+    found = json.loads(unescape(re.search(r'data-found="([^"]*)"', done.stdout).group(1)))
+    openings = [state.opening for state in kit_page.designs[0].states
+                if (state.stage, state.role) == ("assigned", "deployed")]
+    first, last = np.degrees(openings[-1]), np.degrees(openings[0])
+    shown = [float(text.rstrip("°")) for text, _ in found]
+    assert shown == pytest.approx([first, first + 0.25 * (last - first), last], abs=0.06)
+    assert [address for _, address in found] == ["0", "0.25", "1"]
+
+
+@browser
+def test_pictures_follow_the_slider(kit_page, tmp_path):
+    """A design that is half closed covers other pixels."""
+    from matplotlib.image import imread
+
+    path = save_viewer(tmp_path / "view.html", kit_page)
+    covered = []
+    for opening in ("0", "1"):
+        run_chromium(f"{path.as_uri()}#design=0&role=deployed&target=0&opening={opening}", tmp_path,
+                     f"--screenshot={tmp_path / 'view.png'}")
+        pixels = imread(tmp_path / "view.png")[60:, 300:, :3]
+        covered.append(np.ptp(pixels, axis=2) > 0.25)
+    assert min(c.sum() for c in covered) > 300
+    assert (covered[0] & covered[1]).sum() < 0.6 * covered[0].sum()
+
+
+@browser
+def test_five_designs_of_full_size_load_in_three_seconds(repository, tmp_path):
+    """As a run of five C-shells leaves them: five stages, eight states on the way to the opening."""
+    designs = []
+    for design in load_designs(repository / "models" / "conformals", 5):
+        drawn = design_scene(design, design.deploy(), frames=8).designs[0]
+        stages = ViewerScene("", ()).stages
+        states = [replace(s, stage=stage) for stage in stages for s in drawn.states if s.final or stage == stages[-1]]
+        designs.append(replace(drawn, states=states))
+    path = save_viewer(tmp_path / "five.html", ViewerScene("Five designs", designs))
+    assert 3e6 < path.stat().st_size < 1e7
+    seconds = []
+    for _ in range(4):  # other programs may keep the machine busy
+        done = run_chromium(path.as_uri(), tmp_path, "--timeout=8000", "--dump-dom", budget=None)
+        assert "data-failed" not in done.stdout
+        seconds.append(int(re.search(r'data-first-drawn="(\d+)"', done.stdout).group(1)) / 1000)
+        if seconds[-1] < 3:
+            break
+    assert min(seconds) < 3
