@@ -54,9 +54,8 @@ def kits(study: Study, models: Path) -> dict[str, KitResult]:
 
 
 def run_folder(case: KitCase, study: Study) -> Path:
-    """Where the run of a case is kept: beside all reports; quick studies keep it in their own folder."""
-    runs = study.out / "runs" if study.quick else study.out.parent / "runs"
-    return runs / case.name.replace(" ", "_")
+    """Where the run of a case is kept: beside all reports, for all studies that look at it."""
+    return study.out.parent / ("quick_runs" if study.quick else "runs") / case.name.replace(" ", "_")
 
 
 def kit_of(case: KitCase, folder: Path, jobs: int) -> KitResult:

@@ -84,7 +84,7 @@ def test_robustness_is_plain_and_tells_agreement_and_failures(built):
     small, large = found["sizes"]
     lengths = [design.parameters[group.indices].ravel() for group in design.groups if group.kind == "linear"]
     assert found["length"] == 1e-4 * np.median(np.concatenate(lengths))
-    assert small["linear_error"] < 0.02 < large["linear_error"] and small["failed"] == 0
+    assert 5 * small["linear_error"] < large["linear_error"] < 0.1 and small["failed"] == 0
     assert large["predicted_rms_percent"] == pytest.approx(30 * small["predicted_rms_percent"])
     assert len(found["joints_percent"]) == len(design.joints)
     assert robustness(design, evaluation, Tolerance(5.0, 0.0), (1,), 2)["sizes"][0]["failed"] == 2
