@@ -1,0 +1,56 @@
+"""Tasks of the studies' sweeps: they read designs from files, and give plain data (see `kop_exudyn.analysis.sweep`)."""
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Mapping, Sequence
+
+from ..analysis.kit_search import find_kit
+from ..analysis.slits import slit_kit
+from ..analysis.sweep import Task
+from ..io.designs import load_design, select_files
+from ..optimize.stages import StageSettings
+from .study import Study
+
+SIZES = (2, 3, 4, 6, 8, 10, 12, 16, 20, 25)
+QUICK = StageSettings(schedule=(1e3, 1e5), relaxed_steps=2, round_steps=2, reassignments=1, path_steps=2, restarts=5)
+
+
+def size_tasks(files: Sequence[Path], sizes: Sequence[int], others: Mapping[str, int], stages: StageSettings,
+               jobs: int, kind: str = "linear") -> list[Task]:
+    """Kits of fewer and fewer parts of one kind, each starting from the one before.
+
+    files : of the designs; sizes : numbers of parts of that kind; others : kind -> number of parts, always the same
+    """
+    tasks: list[Task] = []
+    for size in sorted(sizes, reverse=True):
+        settings = {"files": list(files), "parts": {kind: size, **others}, "stages": changed(stages)}
+        tasks.append(Task(f"{size} {kind} parts", kit_task, settings, {"jobs": jobs},
+                          after=tasks[-1].name if tasks else None))
+    return tasks
+
+
+def kit_task(files: Sequence[Path], parts: Mapping[str, int], stages: Mapping[str, Any], jobs: int,
+             before: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """See `find_kit`; it starts from the result of the task before, if there is one."""
+    start = None if before is None else before["realised"]
+    return find_kit([load_design(file) for file in files], parts, StageSettings(**stages), start, jobs)
+
+
+def slit_task(files: Sequence[Path], parts: int, penalty: float | None) -> dict[str, Any]:
+    """See `slit_kit`."""
+    return slit_kit([load_design(file) for file in files], parts, penalty)
+
+
+def changed(stages: StageSettings) -> dict[str, Any]:
+    """The settings that aren't the default ones, as plain data."""
+    usual = asdict(StageSettings())
+    return {name: value for name, value in asdict(stages).items() if value != usual[name]}
+
+
+def shared_sizes(models: Path, study: Study) -> list[Task]:
+    """The kits of the trade-off study, which other studies look at as well: five C-shells, or two small ones."""
+    jobs = 1 if study.scheduler else study.jobs  # workers of a cluster start no processes
+    if study.quick:
+        return size_tasks(select_files(models / "small", 2), (2, 3, 5), {"angular": 2}, QUICK, jobs)
+    return size_tasks(select_files(models / "conformals", 5), SIZES, {"angular": 5}, StageSettings(), jobs)
