@@ -8,8 +8,8 @@ from pathlib import Path
 HELP = "write cut lists, cut sheets, assembly plans and 3D files of a finished kit"
 DESCRIPTION = """Reads the folder that `kop optimize` wrote, and writes two folders: workshop (cut list, bills and
 assembly plans as CSV; labelled assembly drawings as SVG and PDF; cut sheets and corner templates at true scale as SVG,
-and DXF with the extra [fab]) and desk (the assigned designs' states as OBJ centre lines, PLY and GLB solids, VTU with strains, stresses
-and utilisation, and tables as CSV)."""
+and DXF with the extra [fab]) and desk (the assigned designs' states as OBJ centre lines, PLY and GLB solids, VTU with
+strains, stresses and utilisation, and tables as CSV)."""
 EXAMPLES = """examples:
   kop export out/kit models/conformals --out out/files --unit m"""
 

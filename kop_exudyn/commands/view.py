@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
 HELP = "write a page that shows a finished kit, or a deployed design, in 3D"
 DESCRIPTION = """Writes one self-contained HTML page with an orbitable 3D view; it needs no network. Of a result (the
-folder that `kop optimize` wrote, with the folder of its designs): all designs in all stages, rods with their true sections,
-coloured by part, deviation or utilisation, and where each part is used. Of a design file: that design, deployed. Both
-with the target surface and a slider for the opening."""
+folder that `kop optimize` wrote, with the folder of its designs): all designs in all stages, rods with their true
+sections, coloured by part, deviation or utilisation, and where each part is used. Of a design file: that design,
+deployed. Both with the target surface and a slider for the opening."""
 EXAMPLES = """examples:
   kop view out/kit models/conformals --out kit.html
   kop view models/conformals/03_exp.json --out exp.html"""

@@ -114,7 +114,7 @@ def final_states(result: KitResult) -> dict[tuple[str, str, str], Equilibrium]:
 
 
 def remarks(result: KitResult) -> list[str]:
-    """What a reader should know besides the figures: snaps, other states that designs open into, yield, ends of SQPs."""
+    """What a reader should know besides the figures: snaps, other states to open into, yield, how SQPs ended."""
     stages = result.stages
     found = [f"{jump.design} snapped at {jump.fraction:.0%} of the way to its parts: {jump.distance:.1%} of its size."
              for jump in stages["assigned"].jumps]

@@ -142,14 +142,17 @@
   function redraw() {
     if (queued) return;
     queued = true;
-    requestAnimationFrame(() => { queued = false; paint(); });
+    requestAnimationFrame(() => {
+      queued = false;
+      paint();
+      root.dataset.firstFrame ??= String(Math.round(performance.now()));  // ms from the page's request
+    });
   }
 
   function paint() {
     layOut();
     draw();
     root.dataset.drawn = String(1 + Number(root.dataset.drawn || 0));
-    root.dataset.firstDrawn ??= String(Math.round(performance.now()));  // ms from the page's request
   }
 
   function pick(x, y) {
@@ -319,5 +322,6 @@
   options("colour", scene.colourings, "colour");
   listen();
   fromAddress();
+  paint();
   root.dataset.ready = "1";
 })();
