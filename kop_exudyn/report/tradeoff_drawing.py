@@ -7,7 +7,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import ScalarFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
 from ..analysis.tradeoff import envelope
 from .style import FAINT, PALETTE, QUIET, style
@@ -40,12 +40,23 @@ def draw_tradeoff(rows: Rows, kind: str, knee: int | None = None) -> Figure:
         cost.set(title="Time", ylabel="wall time of each kit, s", ylim=(0, None))
         for ax in axes[1]:
             ax.set_xlabel(f"{kind} parts")
-        fit.yaxis.set_major_formatter(ScalarFormatter())
+            ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+        plain_log(fit)
         for ax in (fit, energy):
             ax.legend()
         if knee is not None:
             _mark(axes.ravel(), fit, sizes[knee], rows[knee])
     return figure
+
+
+def plain_log(ax: Axes) -> None:
+    """Plain numbers on a logarithmic axis that may cover less than a decade."""
+    low, high = ax.get_ylim()
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    if high < 30 * low:
+        ticks = [m * 10.0**k for k in range(-9, 10) for m in (1, 2, 5)]
+        ax.set_yticks([tick for tick in ticks if low <= tick <= high])
+    ax.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _line(ax: Axes, sizes: Sequence[int], values: Sequence[float | None], form: str, colour: str,

@@ -1,0 +1,75 @@
+"""Reuse of parts: how much five C-shells share.
+
+    python studies/part_reuse.py [--quick] [--out DIR] [--jobs N] [--scheduler ADDRESS] [--resume]
+
+The kits of the study of kit sizes (conformals 1 to 5, 5 angular and 2 to 25 linear parts) are looked at again: which
+design uses which part how often, and how much of its pieces any set of designs shares.
+
+The reuse of a set of designs is the number of pieces that all of them use over the number that any of them uses; for two
+designs that is the Jaccard index of their multisets of pieces. The average is over all sets of two or more designs.
+Kits that the other study left in its folder are taken from there, missing ones are computed.
+"""
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from kop_exudyn.analysis.reuse import counts_of, jaccard_matrix, part_users, reuse_figures
+from kop_exudyn.report.reuse_drawing import draw_reuse_over_size, draw_sharing, draw_subsets
+from kop_exudyn.report.study import Study
+from kop_exudyn.report.study_tasks import shared_sizes
+
+MODELS = Path(__file__).resolve().parents[1] / "models"
+SHOWN = 12  # linear parts of the kit that is shown in detail
+
+
+def main() -> None:
+    study = Study.from_command_line(__doc__, __file__)
+
+    # 1. The kits, from the folder of the other study where it was run.
+    tasks = shared_sizes(MODELS, study)
+    kits = study.sweep(tasks, also=[study.out.parent / "kit_size_tradeoff" / "sweep"], jobs=1)
+    kits = {task.settings["parts"]["linear"]: kits[task.name] for task in reversed(tasks)
+            if "failed" not in kits[task.name]}
+
+    # 2. The figures of each, and the details of one.
+    found = {size: reuse_figures(kit["pieces"]) for size, kit in kits.items()}
+    rows = [{"linear": size, "pieces": f["pieces"], "kit size %": f["kit_size_percent"],
+             "average reuse": f["average_reuse"], "linear reuse": f["by_kind"]["linear"],
+             "angular reuse": f["by_kind"]["angular"], "parts of one design": f["parts_of_one_design"],
+             "sets that share nothing": len(f["groups"])} for size, f in found.items()]
+    size = min(kits, key=lambda s: abs(s - SHOWN))
+    kit, detail = kits[size], found[size]
+    names = [design["name"] for design in kit["designs"]]
+    labels = [f"{kind[0].upper()}{k + 1}" for kind in sorted(kit["pieces"][0]) for k in range(len(kit["kit"][kind]))]
+    counts = counts_of(kit["pieces"])
+    pairs = [(detail["jaccard"][i][j], names[i], names[j]) for i in range(len(names)) for j in range(i)]
+    most, least = max(pairs), min(pairs)
+    shared = int(np.count_nonzero(part_users(counts) == len(names)))
+    finding = (f"Of the {len(labels)} parts of the kit with {size} linear ones, {shared} are used by all {len(names)} designs; "
+               f"{most[1]} and {most[2]} share most ({most[0]:.0%} of their pieces), {least[1]} and {least[2]} least "
+               f"({least[0]:.0%}). From {rows[0]['linear']} to {rows[-1]['linear']} linear parts the average reuse goes "
+               f"from {rows[0]['average reuse']:.2f} to {rows[-1]['average reuse']:.2f}.")
+
+    # 3. The report.
+    report = study.report(finding)
+    report.figure("sharing", draw_sharing(names, counts, labels, jaccard_matrix(counts)),
+                  f"The kit with {size} linear parts (L) and its angular ones (A). Left: how many pieces of each part a "
+                  "design is built of. Right: share of the pieces that two designs have in common.",
+                  alt="Pieces of each part by design, and the Jaccard index of each pair")
+    report.figure("subsets", draw_subsets(detail["subsets"], names), "Every set of two or more designs.",
+                  alt="Reuse of all sets of designs, by their size")
+    groups = "; ".join(", ".join(names[k] for k in group) for group in detail["groups"])
+    report.text(f"Sets of designs that share no part: {groups}." if len(detail["groups"]) > 1 else
+                "All designs are connected by common parts: no set of them has a kit of its own.")
+    report.section("Against the size of the kit", "The same figures for every number of linear parts.")
+    report.figure("sizes", draw_reuse_over_size(rows, "linear"), "Every kit of the study of sizes.",
+                  alt="Average reuse and kit size over linear parts")
+    report.table("kits", rows, "Pieces: as many of each part as the design that needs most; parts of one design: that "
+                 "no other one uses; sets that share nothing: 1 means that all designs are connected.")
+    report.save({"finding": finding, "kits": rows, "details": {str(s): f for s, f in found.items()}, "designs": names})
+
+
+if __name__ == "__main__":
+    main()
