@@ -22,13 +22,14 @@ from ..optimize.objective import Evaluation
 from ..scene.scene import Scene
 from ..scene.surface import TriangleSurface
 from ..structures.base import Design, Target
+from .clipping import clipped
 from .viewer import ViewerDesign, ViewerPart, ViewerRods, ViewerScene, ViewerState
 
 log = logging.getLogger(__name__)
 
 _SLENDERNESS = 250  # size over breadth of rods that have no section of their own
 _LEAST_SHARE = 0.04  # of the opening: nearer to flat, the branch meets its bifurcation
-_NEIGHBOURS = 4  # of a joint: as far as the farthest of them, the target is drawn
+_NEIGHBOURS = 3  # of a joint: as far as the farthest of them, the target is drawn
 _KIND_SHIFT = 0.35  # rad of hue between the first colours of kinds
 
 
@@ -173,13 +174,10 @@ class _Drawing:
 
 
 def _target_near(target: Target) -> tuple[np.ndarray, np.ndarray]:
-    """The target's triangles around the joints: surfaces may go on far beyond the design."""
+    """The target around the joints, cut off at a distance from them: surfaces may go on far beyond the design."""
     tree = cKDTree(target.positions)
     reach = tree.query(target.positions, k=min(_NEIGHBOURS + 1, len(target.positions)))[0].max()
-    distance = tree.query(target.vertices[target.faces].mean(axis=1))[0]
-    faces = target.faces[distance <= reach]
-    used, numbers = np.unique(faces, return_inverse=True)
-    return target.vertices[used], numbers.reshape(-1, 3)
+    return clipped(target.vertices, target.faces, tree.query(target.vertices)[0] - reach)
 
 
 def _ring_nodes(scene: Scene) -> np.ndarray:
