@@ -405,24 +405,31 @@ def _accept_rotation_markers() -> None:
     warnings.simplefilter("ignore", DeprecationWarning)
 
 
-def solve_alone(scene: Scene, q: np.ndarray, iterations: int = 50) -> dict[str, float | int | str]:
-    """Exudyn's static solver by itself, from the scene's initial state: what the fast solver is measured against.
+def solve_alone(scene: Scene, q: np.ndarray, iterations: int = 50, *, residual: float | None = None,
+                start: State | None = None) -> dict[str, float | int | str]:
+    """Exudyn's static solver by itself: what the fast solver is measured against.
 
-    For scenes without actuation and terms. Returns seconds and iterations, or why it stopped, as plain data.
+    For scenes without actuation and terms.
+    residual : force at which it may stop; default: only at 1e-8 of the first residual
+    start : state, default the scene's initial one
+
+    Returns seconds and iterations, or why it stopped, and the positions reached, as plain data.
     """
     model = ExudynModel(scene)
     lengths = scene.rest_lengths(q)
     reference = model._reference(lengths)
-    state = scene.with_driven(scene.initial, q)
-    start = Equilibrium(state=state, q=q, opening=None, torque=0.0, stress=np.zeros((len(lengths), 6)),
+    state = scene.with_driven(scene.initial if start is None else start, q)
+    origin = Equilibrium(state=state, q=q, opening=None, torque=0.0, stress=np.zeros((len(lengths), 6)),
                         elastic_energy=0.0, potential=0.0, iterations=0, residual=0.0, escapes=0, wall_s=0.0)
     with warnings.catch_warnings():
         _accept_rotation_markers()
-        model._set_parameters(start, lengths, reference)
+        model._set_parameters(origin, lengths, reference)
     data = model._mbs.systemData
     data.SetODE2Coordinates((model._coordinates(state) - reference).ravel(), configuration=exu.ConfigurationType.Initial)
     static = model._settings.staticSolver
     static.newton.maxIterations, static.newton.relativeTolerance = iterations, 1e-8
+    if residual is not None:
+        static.newton.absoluteTolerance = residual / model._force
     solver, begin = exu.MainSolverStatic(), perf_counter()
     try:
         converged = solver.SolveSystem(model._mbs, model._settings)
