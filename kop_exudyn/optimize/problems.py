@@ -79,6 +79,14 @@ class RelaxedProblem:
                            sp.csc_matrix(sp.csc_matrix(quadratic.pp)[used][:, used]))
         return Derivatives(gradient, hessian, extra, own)
 
+    def first_derivatives(self, point: Point) -> Derivatives:
+        """The gradient alone: one adjoint solve a state instead of all sensitivities."""
+        data: DatasetPoint = point.data
+        designs = self.dataset.derivatives(data.evaluations, hessian=False)
+        data.evaluations = [d.evaluation for d in designs]
+        own = np.concatenate([w * d.gradient for w, d in zip(self.dataset.design_weights, designs)])
+        return Derivatives(own + self.projection.gradient(point.x, data.kit, data.assignment))
+
 
 class AssignedProblem:
     """J(x) = sum F(M x) over x = (p, y): the parts p, every element being its part, and the parameters y of no element.
@@ -137,6 +145,14 @@ class AssignedProblem:
         unused = np.flatnonzero(np.abs(hessian).sum(axis=1) == 0)
         hessian[unused, unused] = np.abs(hessian.diagonal()).mean()  # parts that nothing uses stay where they are
         return Derivatives(gradient, sp.csc_matrix(hessian))
+
+    def first_derivatives(self, point: Point) -> Derivatives:
+        """The gradient alone, as in `RelaxedProblem`."""
+        data: DatasetPoint = point.data
+        designs = self.dataset.derivatives(data.evaluations, hessian=False)
+        data.evaluations = [d.evaluation for d in designs]
+        weighted = np.concatenate([w * d.gradient for w, d in zip(self.dataset.design_weights, designs)])
+        return Derivatives(self.matrix.T @ weighted)
 
     def _limit_by_designs(self) -> None:
         """An element's own bounds are its part's: entries of M are +-1, one a row."""

@@ -127,6 +127,10 @@ class _Run:
         self.region = Region(lower, upper, problem.constraints, scale_of(problem))
         self.qp, self.projection = QPSolver(options.qp), QPSolver(options.qp)
         sizes = block_sizes_of(problem)
+        # problems may offer their gradient alone, which costs far less than second derivatives that BFGS won't look at
+        self._derivatives = problem.derivatives
+        if options.hessian == "bfgs":
+            self._derivatives = getattr(problem, "first_derivatives", problem.derivatives)
         self.bfgs = BlockBFGS(sizes, self.region.scale) if options.hessian == "bfgs" else None
         corrected = options.secant and options.hessian == "exact"
         self.secant = SecantCorrection(sizes, self.region.scale) if corrected else None
@@ -134,7 +138,7 @@ class _Run:
 
     def solve(self, x0: np.ndarray, state: SQPState | None, start: Point | None) -> SQPResult:
         state, point = self._begin(x0, state, start)
-        derivatives = self._timed("derivatives", self.problem.derivatives, point)
+        derivatives = self._timed("derivatives", self._derivatives, point)
         while True:
             norm, state = self._stationarity(point, derivatives, state)
             if norm <= self.options.gradient_tolerance * max(state.gradient_scale, abs(point.value)):
@@ -227,7 +231,7 @@ class _Run:
                 actual = point.value - trial.value
                 accepted = actual >= self.options.accept * step.predicted  # false for NaN
                 # a point without derivatives can't be gone on from: it counts as failed
-                derivatives = self._timed("derivatives", self.problem.derivatives, trial) if accepted else None
+                derivatives = self._timed("derivatives", self._derivatives, trial) if accepted else None
             except SimulationFailure as failure:
                 failures, last = failures + 1, str(failure)
                 radius = 0.25 * min(step.length, radius)
