@@ -68,7 +68,7 @@ class Problem(Protocol):
         """The objective at x; ``previous`` is the last accepted point, to start from. May raise SimulationFailure."""
 
     def derivatives(self, point: Point) -> Derivatives:
-        """Derivatives at an accepted point. A problem may also have `first_derivatives`, the gradient alone, for BFGS."""
+        """Derivatives at an accepted point. `first_derivatives`, which a problem may have, gives the gradient alone."""
 
 
 def scale_of(problem: Problem) -> np.ndarray:
