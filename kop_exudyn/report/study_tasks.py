@@ -6,9 +6,12 @@ from pathlib import Path
 from typing import Any, Mapping, Sequence
 
 from ..analysis.kit_search import find_kit
+from ..analysis.new_design import project_design
 from ..analysis.slits import slit_kit
 from ..analysis.sweep import Task
+from ..errors import SimulationFailure
 from ..io.designs import load_design, select_files
+from ..kit.parts import Kit
 from ..optimize.stages import StageSettings
 from .study import Study
 
@@ -35,6 +38,14 @@ def kit_task(files: Sequence[Path], parts: Mapping[str, int], stages: Mapping[st
     """See `find_kit`; it starts from the result of the task before, if there is one."""
     start = None if before is None else before["realised"]
     return find_kit([load_design(file) for file in files], parts, StageSettings(**stages), start, jobs)
+
+
+def project_task(file: Path, factor: float, stages: Mapping[str, Any], before: Mapping[str, Any] | None
+                 ) -> dict[str, Any]:
+    """See `project_design`, with the kit that the task before found. SimulationFailure where it found none."""
+    if before is None:
+        raise SimulationFailure("there is no kit to project onto")
+    return project_design(load_design(file), Kit.from_dict(before["kit"]), factor, StageSettings(**stages))
 
 
 def slit_task(files: Sequence[Path], parts: int, penalty: float | None) -> dict[str, Any]:

@@ -1,0 +1,82 @@
+"""Slit parts: what is left of the projection energy, how long slits get, and what the designs gain."""
+from __future__ import annotations
+
+from typing import Any, Mapping, Sequence
+
+import matplotlib
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
+
+from .style import INK, style
+
+_FORMS = ("o", "s", "^", "D", "v", "P", "X")
+
+
+def draw_slits(rows: Sequence[Mapping[str, Any]]) -> Figure:
+    """Projection energy, mean slit length and largest deviation against the number of parts, a line a cost of slits;
+    and deviation against slit length. Rows: parts, cost (None: no slits), projection energy, mean slit %, max %.
+    """
+    costs = list(dict.fromkeys(row["cost"] for row in rows))
+    with style():
+        figure, axes = plt.subplots(2, 2, figsize=(7.4, 5.8), layout="constrained")
+        energy, slit, fit, gain = axes.ravel()
+        for number, cost in enumerate(costs):
+            own = [row for row in rows if row["cost"] == cost]
+            look = _look(number, len(costs), cost)
+            for ax, x, y in ((energy, "parts", "projection energy"), (slit, "parts", "mean slit %"),
+                             (fit, "parts", "max %"), (gain, "mean slit %", "max %")):
+                ax.plot(_numbers(own, x), _numbers(own, y), **(look | ({"linestyle": ""} if ax is gain else {})))
+        energy.set(title="Projection energy", ylabel="of the linear elements", yscale="log")
+        slit.set(title="Optimal slit length", ylabel="mean over the parts, % of median length", ylim=(0, None))
+        fit.set(title="Fidelity", ylabel="largest deviation, % of box", yscale="log")
+        gain.set(title="Fidelity against slit length", xlabel="mean slit length, % of median length",
+                 ylabel="largest deviation, % of box", yscale="log")
+        for ax in (energy, slit, fit):
+            ax.set_xlabel("linear parts")
+            ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+        for ax in (fit, gain):
+            _plain(ax)
+        figure.legend(*energy.get_legend_handles_labels(), loc="outside lower center", ncols=min(len(costs), 5),
+                      title="cost of slits")
+    return figure
+
+
+def draw_lengths(lengths: np.ndarray, kits: Sequence[tuple[str, np.ndarray]]) -> Figure:
+    """The lengths of all elements, and below them those that the parts of some kits realise.
+
+    lengths : (n,) ; kits : (title, (m, 3) parts: two lengths and the slit's)
+    """
+    with style():
+        figure, (top, bottom) = plt.subplots(2, 1, figsize=(7.4, 2.2 + 0.55 * len(kits)), layout="constrained",
+                                             sharex=True, height_ratios=(1.3, 0.55 * len(kits)))
+        top.hist(lengths, bins=60, color="#9ecae1", edgecolor="white", linewidth=0.3)
+        top.set(ylabel="sides of elements", title="Lengths to realise, and what parts realise")
+        for row, (_, parts) in enumerate(kits):
+            for part in parts:
+                for low in part[:2]:
+                    bottom.plot([low, low + part[2]], [row, row], color="#0072b2", linewidth=5, alpha=0.55,
+                                solid_capstyle="butt")
+                    bottom.plot(low, row, "|", color=INK, markersize=9)
+        bottom.set(yticks=range(len(kits)), yticklabels=[title for title, _ in kits], ylim=(len(kits) - 0.5, -0.5),
+                   xlabel="length from joint to corner, m")
+        bottom.grid(axis="y", visible=False)
+    return figure
+
+
+def _look(number: int, count: int, cost: float | None) -> dict[str, Any]:
+    """No slits: black; the cheaper slits are, the lighter."""
+    colour = INK if cost is None else matplotlib.colormaps["viridis"](number / max(count, 2) * 0.9)
+    return {"marker": _FORMS[number % len(_FORMS)], "markersize": 4.5, "color": colour,
+            "linestyle": "--" if cost is None else "-", "label": "no slits" if cost is None else f"{cost:g}"}
+
+
+def _numbers(rows: Sequence[Mapping[str, Any]], key: str) -> list[float]:
+    return [np.nan if row[key] is None else row[key] for row in rows]
+
+
+def _plain(ax: Axes) -> None:
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.yaxis.set_minor_formatter(NullFormatter())
