@@ -1,0 +1,72 @@
+"""The studies of the stages, of failures, of errors and of pavilions, in their quick modes."""
+from __future__ import annotations
+
+import json
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+
+STUDIES = Path(__file__).resolve().parents[2] / "studies"
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory):
+    """One folder for all reports, so that the runs that several studies look at are computed once."""
+    return tmp_path_factory.mktemp("reports")
+
+
+@pytest.fixture
+def run(out, monkeypatch):
+    """A function that runs a study and gives its data."""
+
+    def run(name: str) -> dict:
+        folder = out / name
+        monkeypatch.setattr(sys, "argv", [f"{name}.py", "--quick", "--jobs", "1", "--out", str(folder)])
+        runpy.run_path(str(STUDIES / f"{name}.py"), run_name="__main__")
+        page = (folder / "index.html").read_text()
+        data = json.loads((folder / "data.json").read_text())
+        assert data["quick"] and data["finding"] in page.replace("&#x27;", "'").replace("&amp;", "&")
+        assert page.count("<img") >= 1
+        return data
+
+    return run
+
+
+def test_direct_vs_relaxed(run):
+    rows = run("direct_vs_relaxed")["designs"]
+    assert {row["class"] for row in rows} == {"C-shells", "grids", "umbrella meshes"}
+    for row in rows:
+        assert row["no equilibrium"] == "–" and row["assigned max %"] < row["direct max %"]
+
+
+def test_robustness(run):
+    data = run("robustness")
+    assert len(data["designs"]) == 3
+    for small, large in zip(data["missed"]["0.1"], data["missed"]["1"]):
+        assert small < 0.1 and small < large
+
+
+def test_two_stage_history(run):
+    rows = run("two_stage_history")["hessians"]
+    assert {(row["Hessian"], row["stage"]) for row in rows} >= {("exact", "relaxed"), ("bfgs", "relaxed")}
+    assert all(row["steps"] >= 1 and row["points tried"] >= row["steps"] for row in rows)
+
+
+def test_where_time_goes(run):
+    data = run("where_time_goes")
+    seconds = {row["phase"]: row["run, s"] for row in data["phases"]}
+    assert seconds["all"] == pytest.approx(sum(s for phase, s in seconds.items() if phase != "all"))
+    assert min(seconds[phase] for phase in ("assembly", "sensitivities", "QP", "Exudyn")) > 0
+    assert data["medians"]["relaxed"]["equilibria"] >= 1
+
+
+def test_quick_failure_and_rescue(run):
+    cases = run("failure_and_rescue")["cases"]
+    assert any(case["snapped"] for case in cases) and not all(case["snapped"] for case in cases)
+
+
+def test_pavilion(run):
+    data = run("pavilion")
+    assert len(data["pavilions"]) == 1 and data["pavilions"][0]["elements"] > 0
