@@ -55,7 +55,7 @@ class LoadedState:
         return np.linalg.norm(self.displacements, axis=1)
 
     def to_dict(self) -> dict[str, Any]:
-        """As `kop simulate --json` has it."""
+        """As `kop simulate --json` has it: lengths in the design's units, percentages of the target's diagonal."""
         d, case = self.deflections, self.case
         return {
             "gravity": None if case.gravity is None else case.gravity.tolist(),

@@ -47,7 +47,11 @@ class SimulationResult:
         return self.equilibria[self.design.fitted_role.name]
 
     def to_dict(self) -> dict[str, Any]:
-        """As `kop simulate --json` prints it."""
+        """As `kop simulate --json` prints it.
+
+        Besides figures named as the attributes: "strength", by state the largest equivalent stress, its share of the
+        elastic limit and the rod element where that is; "loaded", under loads, see `LoadedState.to_dict`.
+        """
         final = self.deployed
         return {
             "design": self.design.name, "unknowns": self.unknowns, "elements": self.elements,

@@ -88,5 +88,6 @@ def _stress(strength: dict) -> str:
     """The largest equivalent stress, and what it is of the elastic limit."""
     if strength["equivalent_stress"] is None:
         return "unknown: the rods have no section"
-    used = "" if strength["utilisation"] is None else f", {100 * strength['utilisation']:.3g} % of the elastic limit"
+    share = strength["utilisation"]
+    used = "" if share is None else f", {100 * share:.3g} % of the elastic limit{': it yields' if share > 1 else ''}"
     return f"{strength['equivalent_stress']:.4g}{used}"

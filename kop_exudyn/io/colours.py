@@ -1,6 +1,8 @@
 """Colours of parts and of values, for everything that is drawn in three dimensions."""
 from __future__ import annotations
 
+from typing import Mapping
+
 import numpy as np
 
 # From OKLab to the cube roots of cone responses, and from these to linear sRGB (B. Ottosson, "A perceptual color space
@@ -14,6 +16,7 @@ _TO_LINEAR = np.array([[4.0767416621, -3.3077115913, 0.2309699292], [-1.26843800
 _LIGHTNESS = (0.62, 0.78, 0.50)
 _CHROMA = 0.13
 _FIRST_HUE = 0.6  # rad
+_KIND_SHIFT = 0.35  # rad of hue between the first colours of kinds
 
 # Dark to bright on a light ground: matplotlib's "inferno", reversed and cut as in the figures, at seven places.
 _SCALE = np.array([[0.973, 0.880, 0.373], [0.988, 0.694, 0.093], [0.971, 0.507, 0.042], [0.896, 0.342, 0.164],
@@ -26,6 +29,11 @@ def part_colours(n: int, shift: float = 0.0) -> np.ndarray:
     light = np.array([_LIGHTNESS[k % len(_LIGHTNESS)] for k in range(n)])
     lab = np.stack([light, _CHROMA * np.cos(hue), _CHROMA * np.sin(hue)], axis=1)
     return to_srgb(np.clip((lab @ _TO_CONES.T) ** 3 @ _TO_LINEAR.T, 0, 1))
+
+
+def kit_colours(sizes: Mapping[str, int]) -> dict[str, np.ndarray]:
+    """kind -> (m, 3) sRGB of its m parts, the same wherever the kit is drawn; kinds start at different hues."""
+    return {kind: part_colours(m, number * _KIND_SHIFT) for number, (kind, m) in enumerate(sizes.items())}
 
 
 def value_colours(shares: np.ndarray) -> np.ndarray:

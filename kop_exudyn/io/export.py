@@ -12,7 +12,7 @@ from ..analysis.strength import materials_of, rod_strength
 from ..errors import InputError
 from ..optimize.objective import Evaluation
 from .assembly import write_assembly_plan
-from .colours import part_colours, to_linear
+from .colours import kit_colours, to_linear
 from .cutlist import Tolerances, write_bill, write_cut_list
 from .cutsheets import cut_sheets, template_sheets
 from .dxf import write_dxf
@@ -89,7 +89,7 @@ def file_stem(name: str) -> str:
 
 def chain_colours(parts: PartsList, placed: PlacedPieces) -> np.ndarray:
     """(n_chains, 3) sRGB of the parts that a scene's rod pieces are made of."""
-    colours = {kind: part_colours(m) for kind, m in parts.kit.sizes.items()}
+    colours = kit_colours(parts.kit.sizes)
     return np.array([_GREY if piece is None else colours[piece.kind][piece.part] for piece in placed.chain_pieces])
 
 

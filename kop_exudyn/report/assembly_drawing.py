@@ -15,7 +15,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from ..analysis.kit_result import KitResult
-from ..io.colours import part_colours
+from ..io.colours import kit_colours
 from ..io.export import file_stem
 from ..io.files import make_folder
 from ..io.pieces import PartsList, Piece, parts_list_of
@@ -105,7 +105,7 @@ def _paper(sheet: _Sheet) -> tuple[float, float]:
 
 
 def _draw_rods(ax: Axes, parts: PartsList, placed: PlacedPieces, sheet: _Sheet) -> None:
-    shades = {kind: part_colours(m) for kind, m in parts.kit.sizes.items()}
+    shades = kit_colours(parts.kit.sizes)
     colours = [FAINT if piece is None else shades[piece.kind][piece.part] for piece in placed.chain_pieces]
     ax.add_collection(LineCollection(sheet.lines, colors=colours, linewidths=2.2, capstyle="butt"))
     ax.autoscale_view()

@@ -13,7 +13,7 @@ from ..analysis.kit_result import KitResult
 from ..analysis.strength import design_strength
 from ..equilibrium.newton import Equilibrium, solve
 from ..errors import SimulationFailure
-from ..io.colours import part_colours
+from ..io.colours import kit_colours
 from ..io.pieces import DesignPieces, PartsList, parts_list_of
 from ..io.placement import PlacedPieces
 from ..kit.kinds import PartKind, part_kind
@@ -30,7 +30,6 @@ log = logging.getLogger(__name__)
 _SLENDERNESS = 250  # size over breadth of rods that have no section of their own
 _LEAST_SHARE = 0.04  # of the opening: nearer to flat, the branch meets its bifurcation
 _NEIGHBOURS = 3  # of a joint: as far as the farthest of them, the target is drawn
-_KIND_SHIFT = 0.35  # rad of hue between the first colours of kinds
 
 
 def kit_scene(result: KitResult, *, frames: int = 0, title: str | None = None) -> ViewerScene:
@@ -63,8 +62,9 @@ def design_scene(design: Design, equilibria: Mapping[str, Equilibrium], *, frame
 def viewer_parts(parts: PartsList) -> list[ViewerPart]:
     """All parts, kind by kind, each with a colour of its own."""
     found = []
-    for number, (kind, values) in enumerate(parts.kit.parts.items()):
-        for k, colour in enumerate(part_colours(len(values), number * _KIND_SHIFT)):
+    colours = kit_colours(parts.kit.sizes)
+    for kind, values in parts.kit.parts.items():
+        for k, colour in enumerate(colours[kind]):
             found.append(ViewerPart(parts.labels[kind][k], kind, colour, _dimensions(part_kind(kind), values[k]),
                                     parts.counts[kind][:, k]))
     return found
