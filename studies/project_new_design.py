@@ -19,7 +19,7 @@ import numpy as np
 
 from kop_exudyn.analysis.sweep import Task
 from kop_exudyn.io.designs import load_design
-from kop_exudyn.optimize.stages import StageSettings
+from kop_exudyn.optimize.stage_settings import StageSettings
 from kop_exudyn.report.projection_drawing import draw_changes, draw_projection
 from kop_exudyn.report.study import Study
 from kop_exudyn.report.study_tasks import QUICK, changed, project_task, shared_sizes
@@ -38,8 +38,9 @@ def main() -> None:
     kits = [task for task in shared_sizes(MODELS, study) if task.settings["parts"]["linear"] >= size]
     tasks = [Task(f"w_c {factor:.3g}", project_task, {"file": file, "factor": factor, "stages": stages},
                   after=kits[-1].name) for factor in factors]
-    study.sweep(kits, also=[study.out.parent / "kit_size_tradeoff" / "sweep"], jobs=1)
-    found = study.sweep(kits + tasks)
+    other = study.out.parent / "kit_size_tradeoff" / "sweep"
+    study.sweep(kits, also=[other], jobs=1)
+    found = study.sweep(kits + tasks, also=[other])
 
     # 2. One row a weight; the best one.
     rows = [row_of(factor, found[task.name]) for factor, task in zip(factors, tasks)]

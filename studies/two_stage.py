@@ -13,7 +13,7 @@ from pathlib import Path
 
 from kop_exudyn.io.designs import load_designs, select_files
 from kop_exudyn.optimize.job import JobSettings
-from kop_exudyn.optimize.stages import StageSettings
+from kop_exudyn.optimize.stage_settings import StageSettings
 from kop_exudyn.report.environment import usable_cores
 from kop_exudyn.report.kit_run import optimize_kit
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from kop_exudyn.io.designs import load_designs, select_files
 from kop_exudyn.optimize.job import JobSettings
-from kop_exudyn.optimize.stages import StageSettings
+from kop_exudyn.optimize.stage_settings import StageSettings
 from kop_exudyn.report.designs import DrawnDesign, draw_designs
 from kop_exudyn.report.history import draw_history
 from kop_exudyn.report.kit_drawings import drawn_stages, histories

@@ -15,7 +15,7 @@ from kop_exudyn.analysis.phases import PhaseClock, StepCosts, medians
 from kop_exudyn.equilibrium.warm_up import warm_up
 from kop_exudyn.io.designs import load_designs
 from kop_exudyn.optimize.job import JobSettings, run_job
-from kop_exudyn.optimize.stages import StageSettings
+from kop_exudyn.optimize.stage_settings import StageSettings
 from kop_exudyn.report.profile_drawing import draw_costs
 from kop_exudyn.report.study import Study
 

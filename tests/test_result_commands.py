@@ -12,7 +12,7 @@ from kop_exudyn.cli import main
 from kop_exudyn.io.designs import load_designs
 from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.optimize.job import JobSettings
-from kop_exudyn.optimize.stages import StageSettings
+from kop_exudyn.optimize.stage_settings import StageSettings
 from kop_exudyn.report.kit_run import optimize_kit
 from kop_exudyn.report.viewer_scenes import kit_scene
 

@@ -10,7 +10,7 @@ from ..errors import SimulationFailure
 from ..kit.parts import Assignment, Kit
 from ..optimize.fitting import TargetFitting
 from ..optimize.objective import Evaluation, Reference
-from ..optimize.stages import SAME_STATE, StageEvent, StageResult, distance
+from ..optimize.stage_results import SAME_STATE, StageEvent, StageResult, distance
 from ..structures.base import Design
 from .strength import strength_summary
 

@@ -12,7 +12,9 @@ from ..optimize.dataset import Dataset
 from ..optimize.objective import Weights
 from ..optimize.pool import DesignPool
 from ..optimize.rounds import in_rounds
-from ..optimize.stages import StageResult, Stages, StageSettings
+from ..optimize.stage_results import StageResult
+from ..optimize.stage_settings import StageSettings
+from ..optimize.stages import Stages
 from ..structures.base import Design
 from .kit_result import summary_of
 

@@ -22,7 +22,7 @@ from ..kit.projection import Projection
 from ..optimize import objective
 from ..optimize.objective import DesignObjective
 from ..optimize.qp import QPSolver
-from ..optimize.stages import StageEvent
+from ..optimize.stage_results import StageEvent
 
 REST = "rest"
 # Phase -> (owner, function): who does it. Time is counted for the innermost phase only.

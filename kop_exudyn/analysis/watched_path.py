@@ -10,7 +10,9 @@ from ..errors import SimulationFailure
 from ..optimize.dataset import Dataset
 from ..optimize.objective import Evaluation, Weights
 from ..optimize.pool import DesignPool
-from ..optimize.stages import Jump, Stages, StageResult, StageSettings, find_jump
+from ..optimize.stage_results import Jump, StageResult, find_jump
+from ..optimize.stage_settings import StageSettings
+from ..optimize.stages import Stages
 from ..structures.base import Design
 
 

@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
 
     from ..io.designs import load_designs, select_files
     from ..optimize.job import JobSettings
-    from ..optimize.stages import StageSettings
+    from ..optimize.stage_settings import StageSettings
     from ..report.environment import usable_cores
     from ..report.kit_run import optimize_kit
 

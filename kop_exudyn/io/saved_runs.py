@@ -11,7 +11,7 @@ from ..equilibrium.newton import Equilibrium, Start, solve
 from ..errors import InputError, SimulationFailure
 from ..kit.parts import Assignment, Kit
 from ..optimize.objective import DesignObjective, Evaluation, Reference, reference_of
-from ..optimize.stages import StageResult
+from ..optimize.stage_results import StageResult
 from ..scene.state import State
 from ..structures.base import Design, Role
 from .results import load_result, load_states
@@ -41,12 +41,13 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
     assignment = Assignment.from_dict(data["assignment"], groups, int(offsets[-1]), kit, source=str(path))
     realised = np.split(assignment.matrix(kit) @ kit.vector, offsets[1:-1])
     references = [_reference(design, states) for design in designs]
+    objectives = [DesignObjective(design, reference=reference) for design, reference in zip(designs, references)]
     result = KitResult(list(designs), references, {}, settings=data["settings"], equilibria=data["equilibria"],
                        newton_iterations=data["newton_iterations"], wall_s=data["wall_s"],
                        peak_memory_mb=data["peak_memory_mb"])
     for stage in STAGES:
-        outcomes = [_outcome(design, reference, stage, states, entry, q if stage == _LAST else None)
-                    for design, reference, entry, q in zip(designs, references, data["designs"], realised)]
+        outcomes = [_outcome(objective, stage, states, entry, q if stage == _LAST else None)
+                    for objective, entry, q in zip(objectives, data["designs"], realised)]
         if None not in outcomes:
             result.stages[stage] = StageResult(outcomes, kit, assignment, data["steps"].get(stage, 0),
                                                data["objective"].get(stage), data["status"].get(stage, ""))
@@ -63,9 +64,10 @@ def _named(designs: Sequence[Design], names: Sequence[str], path: Path) -> list[
     return [same[0] for same in found]
 
 
-def _outcome(design: Design, reference: Reference, stage: str, states: Mapping[tuple[str, str, str], Any],
+def _outcome(objective: DesignObjective, stage: str, states: Mapping[tuple[str, str, str], Any],
              entry: Mapping[str, Any], q: np.ndarray | None) -> Evaluation | SimulationFailure | None:
-    """One design after a stage; None when the files don't say enough."""
+    """The objective's design after a stage; None when the files don't say enough."""
+    design = objective.design
     if "failed" in entry.get(stage, {}):
         return SimulationFailure(entry[stage]["failed"])
     saved = {role.name: states.get((design.name, stage, role.name)) for role in design.roles}
@@ -75,7 +77,6 @@ def _outcome(design: Design, reference: Reference, stage: str, states: Mapping[t
     if q is None:
         return None
     equilibria = {role.name: _equilibrium(design, role, stage, q, saved[role.name]) for role in design.roles}
-    objective = DesignObjective(design, reference=reference)
     return objective.confirm(objective.judge(q, equilibria))
 
 

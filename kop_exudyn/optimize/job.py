@@ -11,7 +11,9 @@ from .dataset import Dataset
 from .objective import Evaluation, Reference, Weights
 from .pool import DesignPool
 from .rounds import in_rounds, that_open
-from .stages import Observer, StageResult, Stages, StageSettings, Store
+from .stage_results import StageResult
+from .stage_settings import StageSettings
+from .stages import Observer, Stages, Store
 
 
 @dataclass(frozen=True)

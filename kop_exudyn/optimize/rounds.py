@@ -10,7 +10,8 @@ import numpy as np
 from ..errors import SimulationFailure
 from .objective import DesignDerivatives, Evaluation
 from .reassign import LocalModel, Reassignment, reassign
-from .stages import SAME_STATE, StageResult, Stages, distance, mixed
+from .stage_results import SAME_STATE, StageResult, distance, mixed
+from .stages import Stages
 
 log = logging.getLogger(__name__)
 

@@ -3,31 +3,26 @@ from __future__ import annotations
 
 import json
 import logging
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any, Callable, Mapping, Protocol, Sequence
 
 import numpy as np
 
 from ..errors import InputError, SimulationFailure
 from ..kit.cluster import cluster
-from ..kit.kinds import Bounds
 from ..kit.parts import Assignment, Kit
 from ..kit.projection import Projection
-from ..structures.base import Design
-from .constraints import LinearConstraints, check_feasible
+from .constraints import check_feasible
 from .dataset import Dataset, evaluations_from_arrays, evaluations_to_arrays
-from .history import SQPState, StepRecord
+from .history import SQPState
 from .objective import Evaluation
 from .problem import Point
 from .problems import AssignedProblem, RelaxedProblem
 from .sqp import SQPOptions, SQPResult, minimise
+from .stage_results import Jump, StageEvent, StageResult, find_jump, restrict
+from .stage_settings import StageSettings
 
 log = logging.getLogger(__name__)
-
-# A joint that moves this much further in one step of the path than in the steps around it has snapped.
-_JUMP_FACTOR = 6.0
-_JUMP_SHARE = 0.01  # of the bounding box; smaller moves are no snap whatever their ratio
-SAME_STATE = 1e-3  # of the bounding box: states whose joints are this close are one
 
 
 class Store(Protocol):
@@ -46,102 +41,6 @@ class NoStore:
 
     def save(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
         pass
-
-
-@dataclass(frozen=True)
-class StageSettings:
-    """Settings of the stages.
-
-    schedule : values of w_c, one after the other; default: 0.1, 1, 10 and 100 times the weight of the fit, so that
-        the balance of fit and projection is the same whatever the weights
-    tight : largest rms distance of elements to their parts, relative to the kind's scale, at which raising w_c ends
-    relaxed_steps, assigned_steps, round_steps : accepted SQP steps at most: for each w_c, for an assigned stage (or
-        baseline) without reassignments, for each round of one with them
-    relaxed_tolerance, last_tolerance, assigned_tolerance : the rounds of the relaxed stage before the last, the last
-        one, and the assigned stage end when steps promise or gain less than this share of J
-    reassignments : rounds of the assigned stage in which elements get other parts (see reassign.py), at most; a round
-        that gains less than `reassigned_tolerance` of J is the last
-    redeployments : how often, after the assigned stage, the designs are opened from their assembly instead of led from
-        the relaxed ones, and the stage goes on from where they end, see `that_open` in rounds.py
-    path_steps : steps of the watched path between the stages
-    rescues : how often w_c is raised by ten when a design fails on that path, or snaps and there are no reassignments
-    growth : how many parts a kind may then get more, when raising w_c didn't help
-    restarts, seed : of the clustering
-    bounds : kind -> (lower, upper) of the parts, besides the natural ones
-    constraints : on the elements of all designs, see `on_elements`; the baselines "direct" and "unrelaxed" keep to them
-        as far as their parts can
-    hessian : "exact" or "bfgs"
-    """
-
-    schedule: tuple[float, ...] | None = None
-    tight: float = 1e-3
-    relaxed_steps: int = 25
-    assigned_steps: int = 40
-    round_steps: int = 15
-    relaxed_tolerance: float = 3e-3
-    last_tolerance: float = 5e-4
-    assigned_tolerance: float = 1e-4
-    reassignments: int = 4
-    reassigned_tolerance: float = 2e-2
-    redeployments: int = 0
-    path_steps: int = 10
-    rescues: int = 2
-    growth: int = 0
-    restarts: int = 20
-    seed: int = 0
-    bounds: Bounds | None = None
-    constraints: LinearConstraints | None = None
-    hessian: str = "exact"
-
-
-@dataclass(frozen=True)
-class StageEvent:
-    """One accepted step, as observers see it: the SQP's name, the record, the objective's terms, w_c (or None).
-
-    The SQP of round 2 of the assigned stage is "assigned-2".
-    """
-
-    sqp: str
-    record: StepRecord
-    terms: Mapping[str, float]
-    weight: float | None
-
-    @property
-    def stage(self) -> str:
-        """ "relaxed" with all its w_c and rescues, "assigned" with all its rounds, or "unrelaxed"."""
-        return "relaxed" if self.weight is not None else self.sqp.partition("-")[0]
-
-    @property
-    def round(self) -> int | None:
-        """The round of the assigned stage, from 1; None elsewhere."""
-        number = self.sqp.partition("-")[2]
-        return int(number) if self.stage == "assigned" and number else None
-
-
-@dataclass(frozen=True)
-class Jump:
-    """A snap on the path to the parts: which design, at which fraction of the way, how far (share of the box)."""
-
-    design: str
-    fraction: float
-    distance: float
-
-
-@dataclass
-class StageResult:
-    """What a stage left: by design an evaluation confirmed by Exudyn, or the failure that it met.
-
-    kit, assignment : those that the stage ended with
-    steps : accepted steps; value : objective (None where a design failed); status : of the last SQP
-    """
-
-    designs: list[Evaluation | SimulationFailure]
-    kit: Kit
-    assignment: Assignment
-    steps: int = 0
-    value: float | None = None
-    status: str = ""
-    jumps: list[Jump] = field(default_factory=list)
 
 
 Observer = Callable[[StageEvent], None]
@@ -262,8 +161,8 @@ class Stages:
         in the end, and the state at the parts.
         """
         settings = self.settings
-        weight = settings.schedule[-1]
-        for rescue in range(settings.rescues + 1):
+        attempts = settings.rescues + (0 if fixed_kit else settings.growth)
+        for attempt in range(attempts + 1):
             designs, jumps = self._to_parts(relaxed.designs, relaxed.kit, relaxed.assignment)
             failed = [d for d in designs if isinstance(d, SimulationFailure)]
             for jump in jumps:
@@ -272,17 +171,27 @@ class Stages:
             for failure in failed:
                 log.warning("%s", failure)
             needed = failed or jumps and not settings.reassignments
-            if not needed or rescue == settings.rescues:
+            if not needed or attempt == attempts:
                 break
-            weight *= 10
-            log.warning("raising w_c to %g", weight)
-            before = relaxed
-            q = np.concatenate([e.q for e in before.designs])
-            result, _ = self._relax(f"rescue-{rescue + 1}", weight, q, before.designs, before.kit, fixed_kit)
-            data = result.point.data
-            relaxed = StageResult(list(data.evaluations), data.kit, data.assignment, before.steps + result.steps,
-                                  result.point.value, result.status, before.jumps + jumps)
+            relaxed = self._rescued(relaxed, attempt, jumps, fixed_kit)
         return relaxed, self.confirmed(self._result(designs, relaxed.kit, relaxed.assignment, jumps=jumps))
+
+    def _rescued(self, relaxed: StageResult, attempt: int, jumps: list[Jump], fixed_kit: bool) -> StageResult:
+        """The relaxed stage again from its end: with w_c raised, later with one more part of every kind."""
+        settings, kit, q = self.settings, relaxed.kit, np.concatenate([e.q for e in relaxed.designs])
+        if attempt < settings.rescues:
+            weight = settings.schedule[-1] * 10 ** (attempt + 1)
+            log.warning("raising w_c to %g", weight)
+        else:
+            weight = settings.schedule[-1]
+            sizes = {kind: count + 1 for kind, count in kit.sizes.items()}
+            log.warning("one more part of every kind: %s", sizes)
+            kit = cluster(self.dataset.groups, q, sizes, bounds=settings.bounds, restarts=settings.restarts,
+                          seed=settings.seed).kit
+        result, _ = self._relax(f"rescue-{attempt + 1}", weight, q, relaxed.designs, kit, fixed_kit)
+        data = result.point.data
+        return StageResult(list(data.evaluations), data.kit, data.assignment, relaxed.steps + result.steps,
+                           result.point.value, result.status, relaxed.jumps + jumps)
 
     # -- pieces ----------------------------------------------------------------------------------------------------
     def _relax(self, name: str, weight: float, q: np.ndarray, evaluations: Sequence[Evaluation], kit: Kit,
@@ -371,46 +280,3 @@ def _restored(problem: Any, saved: Mapping[str, np.ndarray]) -> tuple[SQPState, 
     point = (problem.point(state.x, evaluations, problem.kit.with_vector(saved["kit"]))
              if isinstance(problem, RelaxedProblem) else problem.point(state.x, evaluations))
     return state, point, [str(row) for row in saved["terms"]]
-
-
-def find_jump(design: Any, start: Evaluation, path: Sequence[Evaluation], diagonal: float) -> Jump | None:
-    """The largest snap on a path of equal parameter steps, or None: joints that move far more in one step."""
-    role = design.fitted_role.name
-    positions = [e.equilibria[role].state.positions[design.joints] for e in (start, *path)]
-    moves = np.array([np.linalg.norm(b - a, axis=1).max() for a, b in zip(positions, positions[1:])]) / diagonal
-    worst = int(np.argmax(moves))
-    if moves[worst] > _JUMP_SHARE and moves[worst] > _JUMP_FACTOR * np.median(moves):
-        return Jump(design.name, (worst + 1) / len(path), float(moves[worst]))
-    return None
-
-
-def distance(design: Design, a: Evaluation, b: Evaluation) -> float:
-    """How far apart two states of a design are: the largest distance of a joint, as a share of the bounding box.
-
-    Each state is at its best placement on the target.
-    """
-    role = design.fitted_role.name
-    joints = [e.fit.placement.apply(e.equilibria[role].state.positions[design.joints]) for e in (a, b)]
-    return float(np.linalg.norm(joints[0] - joints[1], axis=1).max()) / a.fit.diagonal
-
-
-def mixed(results: Sequence[StageResult], dataset: Dataset) -> StageResult:
-    """Each design from its own result, all of the same kit; its objective is to be judged anew."""
-    first = np.cumsum([0, *(len(design.groups) for design in dataset.designs)])
-
-    def pick(name: str) -> tuple[np.ndarray, ...]:
-        return tuple(rows for n, result in enumerate(results)
-                     for rows in getattr(result.assignment, name)[first[n]:first[n + 1]])
-
-    assignment = replace(results[0].assignment, part=pick("part"), variant=pick("variant"))
-    return StageResult([result.designs[n] for n, result in enumerate(results)], results[0].kit, assignment)
-
-
-def restrict(assignment: Assignment, dataset: Dataset, members: Sequence[int]) -> Assignment:
-    """The assignment of some designs of a dataset, in the numbering of their subset."""
-    subset = dataset.subset(members)
-    counts = [len(d.groups) for d in dataset.designs]
-    first = np.cumsum([0, *counts])
-    rows = [k for n in members for k in range(first[n], first[n + 1])]
-    return Assignment(tuple(subset.groups), tuple(assignment.part[k] for k in rows),
-                      tuple(assignment.variant[k] for k in rows), int(subset.offsets[-1]))

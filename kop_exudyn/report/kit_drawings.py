@@ -10,7 +10,7 @@ from ..equilibrium.newton import Equilibrium
 from ..errors import SimulationFailure
 from ..kit.kinds import part_kind
 from ..optimize.objective import Evaluation
-from ..optimize.stages import StageResult
+from ..optimize.stage_results import StageResult
 from ..structures.base import Design, ElementGroup
 from .designs import DrawnDesign, DrawnState
 from .history import History, HistoryStep

@@ -20,7 +20,7 @@ from ..io.checkpoint import Job
 from ..io.run_folder import RunFolder
 from ..kit.cluster import cluster
 from ..optimize.job import JobSettings, run_job
-from ..optimize.stages import StageEvent
+from ..optimize.stage_results import StageEvent
 from ..structures.base import Design
 from .kit_report import write_kit_report
 

@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 from ..analysis.watched_path import watch_one
 from ..errors import SimulationFailure
 from ..io.designs import load_design
-from ..optimize.stages import StageSettings
+from ..optimize.stage_settings import StageSettings
 from .designs import DrawnState
 from .kit_drawings import drawn_state
 from .style import CYCLE, PALETTE, QUIET, deviation_colours, style

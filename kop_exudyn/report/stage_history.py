@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ..analysis.kit_result import KitResult
 from ..optimize.objective import DesignObjective
-from ..optimize.stages import StageEvent
+from ..optimize.stage_results import StageEvent
 from .designs import DrawnState
 from .kit_drawings import drawn_state
 from .style import CYCLE, style

@@ -11,7 +11,7 @@ from ..io.checkpoint import Job
 from ..io.designs import load_designs, select_files
 from ..io.saved_runs import load_run
 from ..optimize.job import JobSettings
-from ..optimize.stages import StageSettings
+from ..optimize.stage_settings import StageSettings
 from .kit_run import described_job, optimize_kit
 from .study import Study
 

@@ -8,7 +8,7 @@ from kop_exudyn.analysis.new_design import changed_parameters, project_design
 from kop_exudyn.io.designs import load_designs
 from kop_exudyn.kit.cluster import cluster
 from kop_exudyn.kit.parts import Assignment
-from kop_exudyn.optimize.stages import StageSettings
+from kop_exudyn.optimize.stage_settings import StageSettings
 from kop_exudyn.structures.base import ElementGroup
 
 STAGES = StageSettings(relaxed_steps=4, path_steps=2, reassignments=1)

@@ -11,7 +11,7 @@ from kop_exudyn.io.export import export_desk, export_workshop, file_stem
 from kop_exudyn.io.result_tables import result_tables
 from kop_exudyn.io.tables import csv_text
 from kop_exudyn.optimize.job import JobSettings, run_job
-from kop_exudyn.optimize.stages import StageSettings
+from kop_exudyn.optimize.stage_settings import StageSettings
 
 trimesh = pytest.importorskip("trimesh")
 

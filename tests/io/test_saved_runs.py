@@ -9,7 +9,7 @@ from kop_exudyn.io.results import load_result, save_result, save_states
 from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.optimize.fitting import TargetFitting
 from kop_exudyn.optimize.job import JobSettings, run_job
-from kop_exudyn.optimize.stages import StageSettings
+from kop_exudyn.optimize.stage_settings import StageSettings
 from kop_exudyn.report.kit_drawings import final_states, summary_rows
 
 

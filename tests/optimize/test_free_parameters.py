@@ -13,7 +13,7 @@ from kop_exudyn.optimize.objective import Weights
 from kop_exudyn.optimize.pool import DesignPool
 from kop_exudyn.optimize.problem import Point
 from kop_exudyn.optimize.problems import AssignedProblem
-from kop_exudyn.optimize.stages import StageSettings
+from kop_exudyn.optimize.stage_settings import StageSettings
 from kop_exudyn.structures.base import Design, design_from_dict
 from kop_exudyn.structures.umbrella_generator import design_on_surface, height_field, hexagon_patch
 from kop_exudyn.structures.umbrella_layout import BaseMesh

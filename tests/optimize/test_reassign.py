@@ -13,7 +13,8 @@ from kop_exudyn.optimize.objective import Weights
 from kop_exudyn.optimize.pool import DesignPool
 from kop_exudyn.optimize.reassign import LocalModel, reassign
 from kop_exudyn.optimize.rounds import in_rounds, that_open
-from kop_exudyn.optimize.stages import Stages, StageSettings
+from kop_exudyn.optimize.stage_settings import StageSettings
+from kop_exudyn.optimize.stages import Stages
 from kop_exudyn.structures.base import design_from_dict
 
 PARTS = {"linear": 5, "angular": 3}
@@ -162,3 +163,17 @@ def test_constraints_on_elements_hold_in_both_stages(stages):
     free = run_job(designs, PARTS, JobSettings(jobs=1, baselines=False, stages=StageSettings(schedule=(1e3, 1e5))))
     q = np.concatenate([e.q for e in free.stages["assigned"].designs])
     assert constraints.violation(q) > 1e-3 * scale
+
+
+def test_a_design_that_snaps_is_rescued_by_weight_then_by_parts(stages, direct, monkeypatch):
+    """Every path seems to snap: w_c rises as often as allowed, then every kind gets one part more, as often."""
+    from kop_exudyn.optimize import stages as module
+    from kop_exudyn.optimize.stage_results import Jump
+
+    monkeypatch.setattr(module, "find_jump", lambda design, *rest: Jump(design.name, 0.5, 0.1))
+    settings = StageSettings(schedule=(1e3,), relaxed_steps=2, reassignments=0, rescues=1, growth=2)
+    paper = Stages(stages.dataset, PARTS, settings)
+    relaxed, at_parts = paper.to_parts(paper.relaxed(direct.kit))
+    assert at_parts.kit.sizes == {kind: count + 2 for kind, count in PARTS.items()}
+    assert len(relaxed.jumps) == 3 * 2 and len(at_parts.jumps) == 2
+    assert np.isfinite(at_parts.value)

@@ -11,7 +11,7 @@ from kop_exudyn.io.checkpoint import CheckpointStore
 from kop_exudyn.io.kits import load_kit
 from kop_exudyn.io.results import load_result, load_states
 from kop_exudyn.optimize.job import JobSettings
-from kop_exudyn.optimize.stages import StageSettings
+from kop_exudyn.optimize.stage_settings import StageSettings
 from kop_exudyn.report.kit_drawings import drawn_designs, histories, part_spaces
 from kop_exudyn.report.kit_run import optimize_kit
 from kop_exudyn.rods.rotations import rotation_z

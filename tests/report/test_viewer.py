@@ -14,7 +14,7 @@ import pytest
 from kop_exudyn.analysis.kit_result import KitResult
 from kop_exudyn.io.designs import load_designs
 from kop_exudyn.optimize.job import JobSettings, run_job
-from kop_exudyn.optimize.stages import StageSettings
+from kop_exudyn.optimize.stage_settings import StageSettings
 from kop_exudyn.report.viewer import (
     ViewerDesign, ViewerPart, ViewerRods, ViewerScene, ViewerState, save_viewer, scene_data, viewer_page)
 from kop_exudyn.report.viewer_scenes import design_scene, kit_scene, opening_path

@@ -15,7 +15,7 @@ from kop_exudyn.io import files
 from kop_exudyn.io.arrays import load_arrays
 from kop_exudyn.optimize import pool
 from kop_exudyn.optimize.job import JobSettings, run_job
-from kop_exudyn.optimize.stages import StageSettings
+from kop_exudyn.optimize.stage_settings import StageSettings
 from kop_exudyn.report.kit_run import optimize_kit
 
 PARTS = {"linear": 2}

@@ -15,7 +15,7 @@ from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.kit.parts import Kit
 from kop_exudyn.optimize import pool
 from kop_exudyn.optimize.job import JobSettings, run_job
-from kop_exudyn.optimize.stages import StageSettings
+from kop_exudyn.optimize.stage_settings import StageSettings
 
 SCHEDULE = (1e3, 1e5)
 

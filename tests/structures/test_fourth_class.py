@@ -12,7 +12,7 @@ import pytest
 
 from kop_exudyn.errors import InputError
 from kop_exudyn.optimize.job import JobSettings, run_job
-from kop_exudyn.optimize.stages import StageSettings
+from kop_exudyn.optimize.stage_settings import StageSettings
 from kop_exudyn.rods.rotations import rotation_z
 from kop_exudyn.scene.builder import SceneBuilder
 from kop_exudyn.structures.base import Design, ElementGroup, Role, Target, design_from_dict, register, registered
