@@ -30,7 +30,7 @@ def draw_slits(rows: Sequence[Mapping[str, Any]]) -> Figure:
                              (fit, "parts", "max %"), (gain, "mean slit %", "max %")):
                 ax.plot(_numbers(own, x), _numbers(own, y), **(look | ({"linestyle": ""} if ax is gain else {})))
         energy.set(title="Projection energy", ylabel="of the linear elements", yscale="log")
-        slit.set(title="Optimal slit length", ylabel="mean over the parts, % of median length", ylim=(0, None))
+        slit.set(title="Optimal slit length", ylabel="mean, % of median length", ylim=(0, None))
         fit.set(title="Fidelity", ylabel="largest deviation, % of box", yscale="log")
         gain.set(title="Fidelity against slit length", xlabel="mean slit length, % of median length",
                  ylabel="largest deviation, % of box", yscale="log")

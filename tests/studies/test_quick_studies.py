@@ -1,0 +1,91 @@
+"""The studies of kits, in their quick mode: one folder of reports, so that later studies find the kits of the first."""
+from __future__ import annotations
+
+import csv
+import json
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+
+STUDIES = Path(__file__).resolve().parents[2] / "studies"
+FIGURES = {"kit_size_tradeoff": ["tradeoff"], "part_reuse": ["sharing", "subsets", "sizes"],
+           "project_new_design": ["sweep", "changes"], "slit_parts": ["slits", "intervals"]}
+
+
+def run(name: str, reports: Path, *arguments: str) -> Path:
+    """Run a study as its command does; the folder of its report."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", [name, "--quick", "--jobs", "1", "--out", str(reports / name), *arguments])
+        runpy.run_path(str(STUDIES / f"{name}.py"), run_name="__main__")
+    return reports / name
+
+
+@pytest.fixture(scope="module")
+def reports(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("reports")
+    for name in FIGURES:
+        run(name, folder)
+    return folder
+
+
+def data_of(reports: Path, name: str) -> dict:
+    return json.loads((reports / name / "data.json").read_text())
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_reports_are_whole(reports, name):
+    page, data = (reports / name / "index.html").read_text(), data_of(reports, name)
+    assert f"<h1>{data['study']}" in page and data["quick"]
+    assert page.count("data:image/png;base64") == len(FIGURES[name]) and len(page) < 5e6
+    for figure in FIGURES[name]:
+        assert (reports / name / f"{figure}.svg").stat().st_size > 1000
+        assert (reports / name / f"{figure}.pdf").read_bytes()[:5] == b"%PDF-"
+    assert data["finding"].endswith(".") and data["times"]["wall_s"] > 0
+
+
+def test_smaller_kits_fit_worse(reports):
+    kits = data_of(reports, "kit_size_tradeoff")["kits"]
+    assert [kit["linear"] for kit in kits] == [2, 3, 5]
+    assert kits[0]["J"] > kits[-1]["J"] and all(0 < kit["mean %"] < kit["max %"] for kit in kits)
+    with open(reports / "kit_size_tradeoff" / "kits.csv", encoding="utf-8") as file:
+        assert [float(row["J"]) for row in csv.DictReader(file)] == [kit["J"] for kit in kits]
+
+
+def test_other_studies_take_the_kits_from_there(reports):
+    assert not (reports / "part_reuse" / "sweep").exists()
+    kept = {path.name for path in (reports / "project_new_design" / "sweep").glob("*-*.json")}
+    assert len(kept) == 2 and all(name.startswith("w_c") for name in kept)
+
+
+def test_reuse_agrees_with_the_sizes(reports):
+    reuse, sizes = data_of(reports, "part_reuse"), data_of(reports, "kit_size_tradeoff")
+    assert [row["kit size %"] for row in reuse["kits"]] == [row["kit size %"] for row in sizes["kits"]]
+    for details in reuse["details"].values():
+        (pair,) = details["subsets"]
+        assert pair["reuse"] == details["average_reuse"] == details["jaccard"][0][1]
+        # of two multisets of equal size: |A u B| = 2 n - |A n B|
+        assert details["kit_size_percent"] == pytest.approx(100 / (1 + pair["reuse"]))
+
+
+def test_a_new_design_is_built_better_after_relaxation(reports):
+    for row in data_of(reports, "project_new_design")["weights"]:
+        assert row["reassigned J"] <= row["built J"] < row["direct J"]
+
+
+def test_slits_help_and_more_parts_need_shorter_ones(reports):
+    cases = {(row["parts"], row["cost"]): row for row in data_of(reports, "slit_parts")["cases"]}
+    for parts in (2, 4):
+        plain, slit = cases[parts, None], cases[parts, 0.01]
+        assert slit["projection energy"] < 0.1 * plain["projection energy"] and slit["max %"] < plain["max %"]
+        assert plain["longest slit %"] == 0
+    assert cases[4, 0.01]["mean slit %"] < cases[2, 0.01]["mean slit %"]
+
+
+def test_a_resumed_study_computes_nothing_again(reports):
+    before = data_of(reports, "slit_parts")
+    kept = {path: path.stat().st_mtime_ns for path in (reports / "slit_parts" / "sweep").iterdir()}
+    run("slit_parts", reports, "--resume")
+    assert {path: path.stat().st_mtime_ns for path in (reports / "slit_parts" / "sweep").iterdir()} == kept
+    assert data_of(reports, "slit_parts")["cases"] == before["cases"]
