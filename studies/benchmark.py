@@ -5,8 +5,8 @@
 How long equilibria, sensitivities and optimisation steps take, for a given error: a cantilever under its weight, a
 grid, a C-shell and umbrella meshes with 1 to 8 rod elements a piece, gridshells of 500 to 100,000 unknowns, and SQP
 steps with the exact Hessian and with BFGS. Errors are the largest distance of a joint from the same design with 12
-elements a piece (the cantilever: 64), in % of the bounding box. Times are wall times after compilation, medians of several runs
-with bars from the least to the most; everything runs in one process, one thing after the other.
+elements a piece (the cantilever: 64), in % of the bounding box. Times are processor times after compilation, medians
+of several runs with bars from the least to the most; all runs in one thread, so on an idle machine they are wall times.
 """
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def main() -> None:
     study = Study.from_command_line(__doc__, __file__, rest)
     warm_up()
     quick = study.quick
-    refinements, runs = ((1, 2), 1) if quick else ((1, 2, 3, 4, 6, 8), 5)
+    refinements, runs = ((1, 2), 1) if quick else ((1, 2, 3, 4, 6, 8), 3)
 
     # 1. Full deployments.
     cases = dict(list(CASES.items())[:2]) if quick else CASES
@@ -60,7 +60,7 @@ def main() -> None:
                        float(np.sqrt(2.04)), runs)
 
     # 3. Size, and 4. optimisation.
-    sizes = scaling((4, 6, 9) if quick else (5, 8, 12, 17, 24, 34, 45, 59), 1 if quick else 5)
+    sizes = scaling((4, 6, 9) if quick else (5, 8, 12, 17, 24, 34, 45, 59), runs)
     designs = [load_design(path) for path in sorted((MODELS / "small").glob("*.json"))[: 1 if quick else 3]]
     steps = sqp_steps(designs, 2 if quick else 15)
 
@@ -81,8 +81,8 @@ def main() -> None:
         "scaling", scaling_figure(sizes, PHASES), "Gridshells with three elements a piece, from their unstressed state "
         "with all lengths shortened by 0.1 %. Every size ran in a process of its own.", alt="time and memory by size")
     report.table("scaling", sizes, "Seconds; assembly, factorisation and rest add up to a whole solve")
-    report.section("Optimisation").figure(
-        "steps", steps_figure(steps), "Relaxed stage of small C-shells from their inputs.", alt="objective by SQP steps")
+    report.section("Optimisation").figure("steps", steps_figure(steps), "Relaxed stage of small C-shells from inputs.",
+                                          alt="objective by SQP steps")
     report.table("steps", [{k: v for k, v in row.items() if k != "values"} for row in steps])
     report.save({"deployments": rows, "ways": ways, "scaling": sizes, "steps": steps, "goals": table},
                 {"refinements": refinements, "runs": runs, "fine": FINE, "change": CHANGE})

@@ -4,7 +4,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
-from time import perf_counter
+from time import process_time
 from typing import Any, Callable, Mapping
 
 import numpy as np
@@ -26,7 +26,10 @@ _EXUDYN_ITERATIONS = 100
 
 @dataclass(frozen=True)
 class Timing:
-    """median, low, high : wall seconds of several runs; value : what the last one returned."""
+    """median, low, high : seconds of several runs; value : what the last one returned.
+
+    Processor time: all that is timed runs in one thread, where it is the wall time of a machine that does nothing else.
+    """
 
     median: float
     low: float
@@ -43,9 +46,9 @@ def timed(function: Callable[[Any], Any], runs: int, prepare: Callable[[], Any] 
     times, value = [], None
     for _ in range(runs):
         prepared = prepare()
-        begin = perf_counter()
+        begin = process_time()
         value = function(prepared)
-        times.append(perf_counter() - begin)
+        times.append(process_time() - begin)
     return Timing(median(times), min(times), max(times), value)
 
 

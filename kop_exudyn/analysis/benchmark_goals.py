@@ -44,12 +44,12 @@ def released(folder: Path, runs: int) -> list[Row]:
     rows = []
     for name, allowed in _FULL.items():
         design = load_design(folder / f"{name}.json.gz")
-        for row in deployments(name, lambda n: _with_arms(design, n), (2, 3, 4), 8, runs):
-            if row["error %"] <= _ALLOWED_ERROR:
-                note = (f"{row['elements a piece']} elements an arm, error {row['error %']:.3f} %, "
-                        f"{row['iterations']} iterations")
-                rows.append(goal(f"full deployment of {name}", allowed, "s", row["seconds"], note))
-                break
+        found = deployments(name, lambda n, d=design: _with_arms(d, n), (2, 3, 4), 8, 1)
+        row = next(row for row in found if row["error %"] <= _ALLOWED_ERROR or row is found[-1])
+        arms = row["elements a piece"]
+        timing = timed(lambda own: own.deploy(), runs, lambda d=design, n=arms: _with_arms(d, n))
+        note = f"{arms} elements an arm, error {row['error %']:.3f} %, {row['iterations']} iterations"
+        rows.append(goal(f"full deployment of {name}", allowed, "s", timing.median, note))
     return rows + [warm_solve(load_design(folder / "hemisphere_5t.json.gz"), runs)]
 
 
@@ -98,15 +98,13 @@ def newton_iteration(runs: int, joints: int = 17) -> list[Row]:
     system = System(scene)
     solve(system, q)
     count = system.counters
-    count.assembly_s = count.factorisation_s = 0.0
     timing = timed(lambda _: solve(system, q), runs)
-    spent = count.assembly_s + count.factorisation_s
+    count.assembly_s = count.factorisation_s = 0.0
+    wall = sum(solve(system, q).wall_s for _ in range(runs))
     note = f"{system.n_unknowns} unknowns, {len(scene.elements)} elements, {timing.value.iterations} iterations"
-    share = count.factorisation_s / runs / timing.median
     return [goal("Newton iteration at 8,000 unknowns", 0.01, "s", timing.median / timing.value.iterations, note),
-            goal("share of the factorisation in it", 0.5, "of the time", share,
-                 f"assembly {count.assembly_s / runs / timing.median:.2f}, rest {1 - spent / runs / timing.median:.2f}",
-                 at_least=True)]
+            goal("share of the factorisation in it", 0.5, "of the time", count.factorisation_s / wall,
+                 f"assembly {count.assembly_s / wall:.2f}", at_least=True)]
 
 
 def full_sensitivities(design: Design, runs: int) -> Row:

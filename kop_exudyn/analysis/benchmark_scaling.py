@@ -4,7 +4,7 @@ from __future__ import annotations
 import multiprocessing
 import resource
 import sys
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
@@ -29,27 +29,27 @@ def scaling(sizes: tuple[int, ...], runs: int) -> list[dict[str, Any]]:
 
 
 def measured(joints: int, runs: int) -> dict[str, Any]:
-    """Seconds by phase of one size, and the process's peak memory in MiB. Phases are medians, so they add up nearly."""
+    """Seconds by phase of one size, and the process's peak memory in MiB."""
     solve(*_system(3))  # compiles
     before = _peak_mib()
-    begin = perf_counter()
+    begin = process_time()
     scene, q = gridshell(joints, _PIECES, _SHRINK)
-    scene_s = perf_counter() - begin
-    begin = perf_counter()
+    scene_s = process_time() - begin
+    begin = process_time()
     system = System(scene)
-    maps_s = perf_counter() - begin
+    maps_s = process_time() - begin
     system.set_parameters(q)
     system.assemble(scene.initial)
     first_s = _seconds(system.factorise)  # with the symbolic analysis
     times = []
     for _ in range(runs):
         system.counters.assembly_s = system.counters.factorisation_s = 0.0
-        begin = perf_counter()
+        begin, wall = process_time(), perf_counter()
         equilibrium = solve(system, q)
-        total = perf_counter() - begin
-        spent = (system.counters.assembly_s, system.counters.factorisation_s)
-        times.append((total, *spent, total - sum(spent)))
-    total, assembly, factorisation, rest = np.median(times, axis=0)
+        total, wall = process_time() - begin, perf_counter() - wall
+        spent = np.array([system.counters.assembly_s, system.counters.factorisation_s]) / wall  # shares of wall time
+        times.append((total, *spent * total, (1 - spent.sum()) * total))
+    total, assembly, factorisation, rest = sorted(times)[len(times) // 2]
     numeric_s = float(np.median([_seconds(system.factorise) for _ in range(runs)]))
     rhs = np.ones(system.n_unknowns)
     solve_s = float(np.median([_seconds(lambda: system.solve(rhs)) for _ in range(runs)]))
@@ -68,9 +68,9 @@ def _system(joints: int) -> tuple[System, np.ndarray]:
 
 
 def _seconds(function) -> float:
-    begin = perf_counter()
+    begin = process_time()
     function()
-    return perf_counter() - begin
+    return process_time() - begin
 
 
 def _peak_mib() -> float:

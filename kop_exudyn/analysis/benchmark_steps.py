@@ -1,7 +1,7 @@
 """What an SQP step costs, with the exact Hessian and with BFGS: seconds, equilibria, and how far it gets."""
 from __future__ import annotations
 
-from time import perf_counter
+from time import process_time
 from typing import Sequence
 
 import numpy as np
@@ -30,10 +30,10 @@ def sqp_steps(designs: Sequence[Design], steps: int, hessians: Sequence[str] = (
         projection = Projection.of_inputs(dataset.groups, dataset.parameters).with_weight(_WEIGHT)
         for hessian in hessians:
             problem = RelaxedProblem(dataset, projection, kit)
-            begin = perf_counter()
+            begin = process_time()
             first = problem.evaluate(dataset.parameters, None)
             result = minimise(problem, dataset.parameters, SQPOptions(hessian=hessian, max_steps=steps), start=first)
-            seconds = perf_counter() - begin
+            seconds = process_time() - begin
             taken, roles = max(result.steps, 1), sum(len(design.roles) for design in designs)
             spent = {phase: float(np.median([record.seconds[phase] for record in result.history]))
                      for phase in ("derivatives", "qp", "evaluate")} if result.history else {}

@@ -43,7 +43,7 @@ def error_against_time(rows: Sequence[Mapping[str, Any]], key: str = "case") -> 
 
 
 def ways_compared(rows: Sequence[Mapping[str, Any]]) -> Figure:
-    """One panel a case, one line a way; ways that got nowhere are named below the title."""
+    """One panel a case, one line a way; ways that got nowhere are named below the axis."""
     cases = list(dict.fromkeys(row["case"] for row in rows))
     ways = list(dict.fromkeys(row["way"] for row in rows))
     with style():
@@ -55,10 +55,8 @@ def ways_compared(rows: Sequence[Mapping[str, Any]]) -> Figure:
                 own = [row for row in rows if row["case"] == case and row["way"] == way]
                 lost += [way] if all(row["error %"] is None for row in own) else []
                 _series(axes, own, way, colour, marker)
-            axes.set(xscale="log", yscale="log", xlabel="time, s", title=case)
-            if lost:
-                axes.text(0.03, 0.03, "\n".join(f"no solution: {way}" for way in lost), transform=axes.transAxes,
-                          fontsize=7)
+            note = f"\n(no solution: {', '.join(lost)})" if lost else ""
+            axes.set(xscale="log", yscale="log", xlabel=f"time, s{note}", title=case)
         panels[0][0].set_ylabel("largest joint error, % of bounding box")
         handles = [plt.Line2D([], [], color=colour, marker=marker, label=way)
                    for way, colour, marker in zip(ways, PALETTE.values(), _MARKERS)]
