@@ -127,6 +127,8 @@ class DesignObjective:
         gradient = np.zeros(len(evaluation.q))
         model = np.zeros((len(evaluation.q),) * 2) if hessian else None
         for role in self.design.roles:
+            if not (self.weights.energy or role.fitted and self.weights.fit):
+                continue
             sensitivities = Sensitivities(self.design.systems[role.name], evaluation.equilibria[role.name])
             if role.fitted and self.weights.fit:
                 self._add_fit(sensitivities, evaluation.fit, gradient, model)

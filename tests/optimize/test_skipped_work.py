@@ -97,6 +97,7 @@ def test_no_terms_of_weight_zero(shell, calls):
         problem.derivatives(evaluation)
         # joints' derivatives for the fit; both states' columns for the energies, the fitted state's for the fit
         assert calls["rows"] == expected and calls["solve_columns"] == 2 - expected
+        assert calls["factorise"] <= 2 - expected
         assert set(evaluation.terms) == ({"fit"} if weights.fit else {"energy deployed", "energy rest"})
 
 
