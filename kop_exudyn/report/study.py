@@ -54,7 +54,7 @@ class Study:
     scheduler: str | None = None
     resume: bool = False
     results: dict[str, TaskResult] = field(default_factory=dict)
-    reused: int = 0
+    computed: set[str] = field(default_factory=set)
     _begin: float = field(default_factory=perf_counter, repr=False)
     _earlier_s: float = field(default=0.0, repr=False)
 
@@ -87,6 +87,11 @@ class Study:
         return self
 
     @property
+    def reused(self) -> int:
+        """How many of the results were there before this run."""
+        return len(self.results.keys() - self.computed)
+
+    @property
     def wall_s(self) -> float:
         """Seconds so far, those of the interrupted runs included."""
         return self._earlier_s + perf_counter() - self._begin
@@ -102,7 +107,7 @@ class Study:
         with self._progress(len(tasks)) as bar:
 
             def observe(result: TaskResult, is_new: bool) -> None:
-                self.reused += not is_new
+                self.computed |= {result.name} if is_new else set()
                 bar.set_postfix_str(result.name, refresh=False)
                 bar.update()
                 if is_new:
