@@ -12,9 +12,10 @@ from ..analysis.sweep import Task
 from ..errors import SimulationFailure
 from ..io.designs import load_design, select_files
 from ..kit.parts import Kit
-from ..optimize.stages import StageSettings
+from ..optimize.stage_settings import StageSettings
 from .study import Study
 
+FULL = StageSettings(reassignments=2)  # further rounds gain little here, and kits of other sizes go on from these
 SIZES = (2, 3, 4, 6, 8, 10, 12, 16, 20, 25)
 QUICK = StageSettings(schedule=(1e3, 1e5), relaxed_steps=2, round_steps=2, reassignments=1, path_steps=2, restarts=5)
 
@@ -64,4 +65,4 @@ def shared_sizes(models: Path, study: Study) -> list[Task]:
     jobs = 1 if study.scheduler else study.jobs  # workers of a cluster start no processes
     if study.quick:
         return size_tasks(select_files(models / "small", 2), (2, 3, 5), {"angular": 2}, QUICK, jobs)
-    return size_tasks(select_files(models / "conformals", 5), SIZES, {"angular": 5}, StageSettings(), jobs)
+    return size_tasks(select_files(models / "conformals", 5), SIZES, {"angular": 5}, FULL, jobs)
