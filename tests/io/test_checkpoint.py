@@ -114,7 +114,7 @@ class TestRunFolder:
             RunFolder.open(tmp_path / "out", job(inputs))
 
     def test_resume_goes_on_or_says_that_it_starts_anew(self, tmp_path, inputs, caplog):
-        with caplog.at_level(logging.INFO):
+        with caplog.at_level(logging.INFO, logger="kop_exudyn"):
             folder = RunFolder.open(tmp_path / "out", job(inputs), resume=True)
         assert "nothing to resume" in caplog.text
         folder.store.save("one", ARRAYS)
