@@ -215,7 +215,9 @@ class Umbrella(Design):
         options = {"arms": self.arms, "plates": self.plates, "arm_elements": self.arm_elements,
                    "plate_elements": self.plate_elements, "plate_model": self.plate_model,
                    "least_length": self.least_length, "pins": self.pins, "deployment": self.deployment}
-        return Umbrella(self.name, mesh, **(options | changes))
+        design = Umbrella(self.name, mesh, **(options | changes))
+        design.loads = self.loads
+        return design
 
 
 @register("umbrella")

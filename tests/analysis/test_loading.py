@@ -97,6 +97,8 @@ def test_umbrella_meshes_stand_on_their_pins_or_corners(repository, pins, suppor
         assert np.abs(moved).max() < 1e-8 * found[-1].diagonal
         assert found[-1].deflections.max() > 1e-5 * found[-1].diagonal
     assert found[0].total_force == pytest.approx(found[1].total_force, rel=1e-9)
+    design.loads = found[-1].case
+    assert design.with_plates("rods").loads is design.loads
     assert found[0].deflections.max() == pytest.approx(found[1].deflections.max(), rel=0.3)
 
 
