@@ -60,7 +60,7 @@ def main() -> None:
                        float(np.sqrt(2.04)), runs)
 
     # 3. Size, and 4. optimisation.
-    sizes = scaling((4, 6, 9) if quick else (5, 8, 12, 17, 24, 34, 45, 59), runs)
+    sizes = scaling((4, 7) if quick else (5, 8, 12, 17, 24, 34, 45, 59), runs)
     designs = [load_design(path) for path in sorted((MODELS / "small").glob("*.json"))[: 1 if quick else 3]]
     steps = sqp_steps(designs, 2 if quick else 15)
 
