@@ -27,7 +27,7 @@ SHARE, ANGLE = 1e-3, radians(0.1)
 
 def main() -> None:
     study = Study.from_command_line(__doc__, __file__)
-    factors, samples = ([0.1, 1.0], 2) if study.quick else ([0.1, 0.3, 1.0, 3.0, 10.0], 24)
+    factors, samples = ([0.1, 1.0], 2) if study.quick else ([0.1, 0.3, 1.0, 3.0, 10.0], 12)
 
     # 1. The kits, and the sensitivities and samples of all designs of each.
     kits(study, MODELS)
