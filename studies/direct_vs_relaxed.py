@@ -14,13 +14,13 @@ from pathlib import Path
 
 from kop_exudyn.analysis.kit_result import STAGES
 from kop_exudyn.report.comparison import comparison_rows, draw_comparison, finding
-from kop_exudyn.report.designs import draw_designs
+from kop_exudyn.report.designs import DrawnDesign, draw_designs
 from kop_exudyn.report.kit_drawings import drawn_stages
 from kop_exudyn.report.study import Study
 from kop_exudyn.report.study_kits import kits
 
 ROOT = Path(__file__).resolve().parents[1]
-LIMIT_PERCENT = 10.0  # darkest colour of the pictures: larger deviations are ruins
+SHOWN = 3  # designs of each class in the pictures: those that gain most
 
 
 def main() -> None:
@@ -44,11 +44,21 @@ def main() -> None:
         sizes = " and ".join(f"{count} {kind}" for kind, count in result.kit.sizes.items())
         elements = sum(design.n_elements for design in result.designs)
         report.section(name, f"{sizes} parts realise {elements} elements of {len(result.designs)} designs.")
-        report.figure(name.replace(" ", "_"), draw_designs(drawn_stages(result, STAGES), LIMIT_PERCENT),
+        report.figure(name.replace(" ", "_"), draw_designs(most_changed(drawn_stages(result, STAGES))),
                       "Equilibria at their best placement on the target; grey: the input design. Joints are coloured by "
-                      f"their deviation; the scale ends at {LIMIT_PERCENT:g} %.",
+                      f"their deviation. Of {len(result.designs)} designs those that direct projection leaves farthest "
+                      "off are shown.",
                       alt=f"The {name} after direct projection, unrelaxed, relaxed and assigned")
     report.save({"finding": outcome, "designs": rows})
+
+
+def most_changed(designs: list[DrawnDesign]) -> list[DrawnDesign]:
+    """The designs with the largest deviations after direct projection; failures first."""
+    def deviation(design: DrawnDesign) -> float:
+        state = design.states[0]
+        return float("inf") if state.failed is not None else max(state.deviation_percent)
+
+    return sorted(designs, key=deviation, reverse=True)[:SHOWN]
 
 
 if __name__ == "__main__":

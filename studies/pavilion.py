@@ -43,7 +43,7 @@ def main() -> None:
     for name, building in chosen.items():
         report.figure(name.replace(" ", "_"), framed(picture(building, **size)),
                       f"{building.name}, {building.elements} elements of {building.parts} parts; every colour is one "
-                      "part. The person is 1.72 m tall.", alt=f"Rendering of {building.name} as a pavilion with a person")
+                      "part. The person is 1.72 m tall.", alt=f"Rendering of {building.name} as a pavilion with a person", colours=None)
     report.table("pavilions", rows, "Deviation: largest distance of a joint from the target surface, in % of its "
                  "bounding-box diagonal.")
     report.save({"finding": finding + ".", "pavilions": rows})

@@ -23,16 +23,17 @@ from tqdm import tqdm
 from tqdm.contrib.logging import logging_redirect_tqdm
 
 from ..analysis.sweep import Task, TaskResult, run_sweep
-from ..io.files import make_folder
+from ..io.files import make_folder, write_bytes
 from ..io.json_files import read_json, write_json
 from ..io.sweep_store import SweepStore
 from ..io.tables import write_csv
 from .environment import environment, usable_cores
 from .page import Page
-from .style import figure_bytes, save_figure
+from .style import figure_bytes, save_figure, with_palette
 
 _SWEEP = "sweep"
 _CLOCK = "wall.json"  # seconds of the runs so far, so that the report of a resumed study counts them all
+_LARGEST_SVG = 1_000_000  # bytes: reports are kept in the repository
 
 
 @dataclass
@@ -145,10 +146,17 @@ class StudyReport:
         self.page.text(text)
         return self
 
-    def figure(self, name: str, figure: Figure, caption: str, *, alt: str) -> StudyReport:
-        """A figure, in the page as pixels, beside it as NAME.svg and NAME.pdf."""
-        save_figure(figure, self.study.out / name, ("svg", "pdf"), overwrite=True)
-        self.page.figure(figure_bytes(figure, "png"), caption, alt=alt, suffix="png")
+    def figure(self, name: str, figure: Figure, caption: str, *, alt: str, colours: int | None = 256) -> StudyReport:
+        """A figure, in the page as pixels, beside it as NAME.pdf and, unless it is too large for that, NAME.svg.
+
+        colours : of the pixels; None: all, for renderings
+        """
+        save_figure(figure, self.study.out / name, ("pdf",), overwrite=True)
+        drawing = figure_bytes(figure, "svg")
+        if len(drawing) <= _LARGEST_SVG:
+            write_bytes(self.study.out / f"{name}.svg", drawing, overwrite=True)
+        pixels = figure_bytes(figure, "png")
+        self.page.figure(pixels if colours is None else with_palette(pixels, colours), caption, alt=alt, suffix="png")
         return self
 
     def table(self, name: str, rows: Sequence[Mapping[str, Any]], caption: str = "") -> StudyReport:
@@ -179,7 +187,7 @@ class StudyReport:
         sweep = f"; {times['tasks']} tasks of {times['tasks_s']:.0f} s in all" if times["tasks"] else ""
         reused = f", {study.reused} of them computed earlier" if study.reused else ""
         return (f"{setting}, {times['wall_s']:.0f} s of wall time on {environment()['cores']} cores{sweep}{reused}. The "
-                "figures are beside this page as SVG and PDF files, its numbers in data.json and CSV files.")
+                "figures are beside this page as PDF files, the smaller ones as SVG too, its numbers in data.json and CSV files.")
 
 
 def described(doc: str) -> tuple[str, str]:
