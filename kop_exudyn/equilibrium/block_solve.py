@@ -33,24 +33,34 @@ def panels_of(indptr: np.ndarray, indices: np.ndarray) -> np.ndarray:
 
 def solve_columns(
     L: sp.csc_matrix, pivots: np.ndarray, order: np.ndarray, panels: np.ndarray, rhs: sp.csc_matrix,
-    column: np.ndarray | None = None, shares: np.ndarray | None = None,
+    constraint: np.ndarray | None = None, column: np.ndarray | None = None,
 ) -> np.ndarray:
-    """A^-1 rhs - column shares^T (n, k) with A = P L D L^T P^T, rhs sparse (n, k), column (n,) and shares (k,)."""
+    """A^-1 rhs (n, k) with A = P L D L^T P^T and rhs sparse (n, k); with a constraint c (n,) and `column` = A^-1 c,
+    the solutions d of A d + c t = rhs, c.d = 0.
+
+    Every t comes from the solution that it corrects: where A is nearly singular, what rounding leaves of its softest
+    mode in a solution is then taken out of it again.
+    """
     n, k = rhs.shape
     place = np.empty(n, np.int64)
     place[order] = np.arange(n)
     out = np.empty((n, k))
-    column, shares = (np.zeros(n), np.zeros(k)) if column is None else (column, shares)
-    _solve_blocks(panels, L.indptr, L.indices, L.data, 1 / pivots, place, rhs.indptr, rhs.indices, rhs.data, column,
-                  shares, out)
+    if constraint is None:
+        constrained, shares, column = np.empty(0, np.int64), np.empty(0), np.zeros(n)
+    else:
+        constrained = np.flatnonzero(constraint)
+        shares = constraint[constrained] / (constraint @ column)
+    _solve_blocks(panels, L.indptr, L.indices, L.data, 1 / pivots, place, rhs.indptr, rhs.indices, rhs.data,
+                  constrained, shares, column, out)
     return out
 
 
 @nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _solve_blocks(panels, indptr, indices, data, inverse, place, rhs_ptr, rhs_rows, rhs_values, column, shares, out):
+def _solve_blocks(panels, indptr, indices, data, inverse, place, rhs_ptr, rhs_rows, rhs_values, constrained, shares,
+                  column, out):
     """Blocks of right-hand sides, one after the other: scatter, forward, backward, gather."""
     n, total = out.shape
-    work, panel = np.empty((n, _BLOCK)), np.empty(_PANEL * _BLOCK)
+    work, panel, multiplier = np.empty((n, _BLOCK)), np.empty(_PANEL * _BLOCK), np.empty(_BLOCK)
     reached = np.empty(len(panels), np.bool_)
     panel_of = np.empty(n, np.int64)
     for s in range(len(panels) - 1):
@@ -69,10 +79,15 @@ def _solve_blocks(panels, indptr, indices, data, inverse, place, rhs_ptr, rhs_ro
                 _forward(panels[s], panels[s + 1], indptr, indices, data, panel_of, work, panel, reached)
         for s in range(len(panels) - 2, -1, -1):
             _backward(panels[s], panels[s + 1], indptr, indices, data, inverse, work, panel)
+        multiplier[:] = 0.0
+        for t in range(len(constrained)):
+            row, share = work[place[constrained[t]]], shares[t]
+            for c in range(k):
+                multiplier[c] += share * row[c]
         for i in range(n):
             row, target, factor = work[place[i]], out[i], column[i]
             for c in range(k):
-                target[first + c] = row[c] - factor * shares[first + c]
+                target[first + c] = row[c] - factor * multiplier[c]
 
 
 @nb.njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")

@@ -47,13 +47,13 @@ class Factorisation:
         return np.stack([self._solver.solve(np.ascontiguousarray(column)) for column in rhs.T], axis=1)
 
     def solve_columns(
-        self, rhs: sp.csc_matrix, column: np.ndarray | None = None, shares: np.ndarray | None = None
+        self, rhs: sp.csc_matrix, constraint: np.ndarray | None = None, column: np.ndarray | None = None
     ) -> np.ndarray:
-        """Solve for many sparse right-hand sides (n, k); column shares^T (n,), (k,) is taken off the result."""
+        """Solve for many sparse right-hand sides (n, k), bordered by a constraint (n,) if its column is given too."""
         L, pivots, order = self._factors
         if self._panels is None:
             self._panels = panels_of(L.indptr, L.indices)
-        return solve_columns(L, pivots, np.asarray(order), self._panels, rhs, column, shares)
+        return solve_columns(L, pivots, np.asarray(order), self._panels, rhs, constraint, column)
 
     @property
     def factor_entries(self) -> int:

@@ -51,10 +51,7 @@ class Sensitivities:
     @cached_property
     def full(self) -> np.ndarray:
         """x_q (n_free, n_parameters): all free unknowns in all parameters; angles in rad, translations global."""
-        rhs = -self._residual_q
-        if self._border is None:
-            return self.system.solve_columns(rhs)
-        return self.system.solve_columns(rhs, self._border.column, self.torque_gradient)
+        return self.system.solve_columns(-self._residual_q, None if self._border is None else self._border.column)
 
     def rows(self, dofs: np.ndarray) -> np.ndarray:
         """Derivatives (m, n_parameters) of any unknowns of the scene, pinned (zero) and driven ones included."""

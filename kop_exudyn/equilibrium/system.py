@@ -143,12 +143,10 @@ class System:
         self.counters.solves += 1 if rhs.ndim == 1 else rhs.shape[1]
         return self.factorisation.solve(rhs)
 
-    def solve_columns(
-        self, rhs: sp.csc_matrix, column: np.ndarray | None = None, shares: np.ndarray | None = None
-    ) -> np.ndarray:
-        """K^-1 rhs - column shares^T (n_free, k) for many sparse right-hand sides rhs (n_free, k)."""
+    def solve_columns(self, rhs: sp.csc_matrix, column: np.ndarray | None = None) -> np.ndarray:
+        """Solutions (n_free, k) for many sparse right-hand sides; with column = K^-1 c on the constraint's kernel."""
         self.counters.solves += rhs.shape[1]
-        return self.factorisation.solve_columns(rhs, column, shares)
+        return self.factorisation.solve_columns(rhs, None if column is None else self.constraint, column)
 
     def multiply(self, v: np.ndarray) -> np.ndarray:
         """K v with the assembled Hessian over the free unknowns."""
