@@ -8,9 +8,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator, NullFormatter
 
-from .style import INK, style
+from .style import FAINT, INK, PALETTE, style
 
 _FORMS = ("o", "s", "^", "D", "v", "P", "X")
 
@@ -29,14 +29,15 @@ def draw_slits(rows: Sequence[Mapping[str, Any]]) -> Figure:
             for ax, x, y in ((energy, "parts", "projection energy"), (slit, "parts", "mean slit %"),
                              (fit, "parts", "max %"), (gain, "mean slit %", "max %")):
                 ax.plot(_numbers(own, x), _numbers(own, y), **(look | ({"linestyle": ""} if ax is gain else {})))
-        energy.set(title="Projection energy", ylabel="of the linear elements", yscale="log")
+        energy.set(title="Projection energy", ylabel="relative to squared median length", yscale="log")
         slit.set(title="Optimal slit length", ylabel="mean, % of median length", ylim=(0, None))
         fit.set(title="Fidelity", ylabel="largest deviation, % of box", yscale="log")
         gain.set(title="Fidelity against slit length", xlabel="mean slit length, % of median length",
                  ylabel="largest deviation, % of box", yscale="log")
         for ax in (energy, slit, fit):
             ax.set_xlabel("linear parts")
-            ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+            ax.xaxis.set_major_locator(MultipleLocator(5) if max(row["parts"] for row in rows) > 10
+                                       else MaxNLocator(integer=True))
         for ax in (fit, gain):
             _plain(ax)
         figure.legend(*energy.get_legend_handles_labels(), loc="outside lower center", ncols=min(len(costs), 5),
@@ -45,21 +46,21 @@ def draw_slits(rows: Sequence[Mapping[str, Any]]) -> Figure:
 
 
 def draw_lengths(lengths: np.ndarray, kits: Sequence[tuple[str, np.ndarray]]) -> Figure:
-    """The lengths of all elements, and below them those that the parts of some kits realise.
+    """The lengths of all elements, and below them those that the parts of some kits realise, a line a part.
 
     lengths : (n,) ; kits : (title, (m, 3) parts: two lengths and the slit's)
     """
     with style():
-        figure, (top, bottom) = plt.subplots(2, 1, figsize=(7.4, 2.2 + 0.55 * len(kits)), layout="constrained",
-                                             sharex=True, height_ratios=(1.3, 0.55 * len(kits)))
+        figure, (top, bottom) = plt.subplots(2, 1, figsize=(7.4, 2.2 + 0.75 * len(kits)), layout="constrained",
+                                             sharex=True, height_ratios=(1.3, 0.75 * len(kits)))
         top.hist(lengths, bins=60, color="#9ecae1", edgecolor="white", linewidth=0.3)
         top.set(ylabel="sides of elements", title="Lengths to realise, and what parts realise")
         for row, (_, parts) in enumerate(kits):
-            for part in parts:
-                for low in part[:2]:
-                    bottom.plot([low, low + part[2]], [row, row], color="#0072b2", linewidth=5, alpha=0.55,
-                                solid_capstyle="butt")
-                    bottom.plot(low, row, "|", color=INK, markersize=9)
+            lines = row + 0.36 * np.linspace(-1, 1, len(parts) + 2)[1:-1]
+            for y, part in zip(lines, parts[np.argsort(parts[:, :2].mean(axis=1))]):
+                bottom.hlines(y, *np.sort(part[:2]), color=FAINT, linewidth=0.8, zorder=1)
+                bottom.hlines([y, y], part[:2], part[:2] + part[2], color=PALETTE["blue"], linewidth=3, alpha=0.6)
+                bottom.plot(part[:2], [y, y], linestyle="", marker="|", color=INK, markersize=6)
         bottom.set(yticks=range(len(kits)), yticklabels=[title for title, _ in kits], ylim=(len(kits) - 0.5, -0.5),
                    xlabel="length from joint to corner, m")
         bottom.grid(axis="y", visible=False)
