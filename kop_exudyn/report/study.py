@@ -45,6 +45,7 @@ class Study:
     quick : the smallest settings that show that it works
     jobs : processes; scheduler : address of a Dask scheduler, or None
     resume : keep the results that an interrupted run left in `out`
+    kits_s : seconds that each kit took which several studies share, whether in this run or in an earlier one
     """
 
     title: str
@@ -56,6 +57,7 @@ class Study:
     resume: bool = False
     results: dict[str, TaskResult] = field(default_factory=dict)
     computed: set[str] = field(default_factory=set)
+    kits_s: dict[str, float] = field(default_factory=dict)
     _begin: float = field(default_factory=perf_counter, repr=False)
     _earlier_s: float = field(default=0.0, repr=False)
 
@@ -174,7 +176,7 @@ class StudyReport:
         study = self.study
         settings = settings or {name: result.described for name, result in study.results.items()}
         times = {"wall_s": study.wall_s, "tasks": len(study.results),
-                 "tasks_s": sum(result.seconds for result in study.results.values())}
+                 "tasks_s": sum(result.seconds for result in study.results.values()), "kits_s": study.kits_s}
         write_json(study.out / "data.json", {"study": study.title, "quick": study.quick, **data, "settings": settings,
                                              "times": times, "environment": environment()}, overwrite=True)
         self.page.section("How it was made", self._times(times))
@@ -186,8 +188,11 @@ class StudyReport:
         setting = "Quick settings" if study.quick else "Full settings"
         sweep = f"; {times['tasks']} tasks of {times['tasks_s']:.0f} s in all" if times["tasks"] else ""
         reused = f", {study.reused} of them computed earlier" if study.reused else ""
-        return (f"{setting}, {times['wall_s']:.0f} s of wall time on {environment()['cores']} cores{sweep}{reused}. The "
-                "figures are beside this page as PDF files, the smaller ones as SVG too, its numbers in data.json and CSV files.")
+        kits = (f" Its {len(study.kits_s)} kits took {sum(study.kits_s.values()):.0f} s, once for all studies that "
+                "look at them.") if study.kits_s else ""
+        return (f"{setting}, {times['wall_s']:.0f} s of wall time on {environment()['cores']} cores{sweep}{reused}."
+                f"{kits} The figures are beside this page as PDF files, the smaller ones as SVG too, its numbers in "
+                "data.json and CSV files.")
 
 
 def described(doc: str) -> tuple[str, str]:

@@ -50,7 +50,10 @@ def three_classes(models: Path, quick: bool = False) -> list[KitCase]:
 
 def kits(study: Study, models: Path) -> dict[str, KitResult]:
     """The kits of the three classes by name."""
-    return {case.name: kit_of(case, run_folder(case, study), study.jobs) for case in three_classes(models, study.quick)}
+    cases = three_classes(models, study.quick)
+    found = {case.name: kit_of(case, run_folder(case, study), study.jobs) for case in cases}
+    study.kits_s |= {name: result.wall_s for name, result in found.items()}
+    return found
 
 
 def run_folder(case: KitCase, study: Study) -> Path:
@@ -59,7 +62,7 @@ def run_folder(case: KitCase, study: Study) -> Path:
 
 
 def kit_of(case: KitCase, folder: Path, jobs: int) -> KitResult:
-    """The kit of a case: a finished run of the same job in its folder, or a new run, which goes on from checkpoints there.
+    """The kit of a case: a finished run of the same job in its folder, or a new run, which goes on from checkpoints.
 
     A run that was read back has no events. Raises InputError and SimulationFailure as `optimize_kit` does.
     """
