@@ -3,10 +3,10 @@
     python studies/pavilion.py [--quick] [--out reports/pavilion] [--jobs 2]
 
 The kits of the study `direct_vs_relaxed` as architecture: one design of each class, enlarged until a person can stand
-beneath it; two are lifted on four masts each, which belong to the picture only. Every rod is the equilibrium shape that Exudyn confirmed, swept with its true
-section, and has the colour of the part that it is cut as. Without weight, a structure that is enlarged together with
-its sections keeps its shape; what self-weight adds is not shown. The pictures are rendered by the package itself, with
-depth buffers for the eye and for eighty lights of sun and sky.
+beneath it; two are lifted on four masts each, which belong to the picture only. Every rod is the equilibrium shape
+that Exudyn confirmed, swept with its true section, and has the colour of the part that it is cut as. Without weight,
+a structure that is enlarged together with its sections keeps its shape; what self-weight adds is not shown. The
+pictures are rendered by the package itself, with depth buffers for the eye and for eighty lights of sun and sky.
 """
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ CHOICE = {"C-shells": ("exp", 9.0, 2.4), "grids": ("dome", 13.0, 0.0), "umbrella
 
 def main() -> None:
     study = Study.from_command_line(__doc__, __file__)
-    size = {"width": 320, "height": 180, "samples": 1, "light": Light(suns=3, skies=6, buffer=300)} if study.quick else {}
+    coarse = {"width": 320, "height": 180, "samples": 1, "light": Light(suns=3, skies=6, buffer=300)}
+    size = coarse if study.quick else {}
 
     # 1. One design of each kit (quick: of the first kit only), in metres.
     chosen = {}
@@ -38,15 +39,17 @@ def main() -> None:
              "plan, m": f"{p.footprint[0]:.1f} x {p.footprint[1]:.1f}", "height, m": p.height, "enlarged": p.scale,
              "max deviation %": p.max_percent} for name, p in chosen.items()]
     finding = "; ".join(f"{p.name} ({name}): {p.elements} elements of {p.parts} different parts span "
-                        f"{max(p.footprint):.0f} m within {p.max_percent:.2g} % of the shape" for name, p in chosen.items())
-    report = study.report(finding + ".")
+                        f"{max(p.footprint):.0f} m within {p.max_percent:.2g} % of the shape"
+                        for name, p in chosen.items()) + "."
+    report = study.report(finding)
     for name, building in chosen.items():
         report.figure(name.replace(" ", "_"), framed(picture(building, **size)),
                       f"{building.name}, {building.elements} elements of {building.parts} parts; every colour is one "
-                      "part. The person is 1.72 m tall.", alt=f"Rendering of {building.name} as a pavilion with a person", colours=None)
+                      "part. The person is 1.72 m tall.",
+                      alt=f"Rendering of {building.name} as a pavilion with a person", colours=None)
     report.table("pavilions", rows, "Deviation: largest distance of a joint from the target surface, in % of its "
                  "bounding-box diagonal.")
-    report.save({"finding": finding + ".", "pavilions": rows})
+    report.save({"finding": finding, "pavilions": rows})
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull
 
 from ..analysis.kit_result import KitResult
 from ..errors import SimulationFailure
-from ..io.colours import part_colours
+from ..io.colours import kit_colours
 from ..io.meshes import sweep, tube
 from ..io.pieces import parts_list_of
 from ..io.placement import PlacedPieces
@@ -21,7 +21,6 @@ _PAPER, _INK, _JOINT = (0.965, 0.962, 0.955), (0.22, 0.23, 0.26), (0.30, 0.31, 0
 _WOOD = (0.78, 0.68, 0.55)  # rods that belong to no part
 _SLENDERNESS = 250  # size over breadth of rods that have no section of their own
 _ANGLE, _RISE = np.radians(26), np.radians(19)  # of the camera: from top to bottom of the picture, above the ground
-_KIND_SHIFT = 0.35  # rad of hue between the first colours of kinds
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,8 @@ def pavilion(result: KitResult, number: int, span: float, clearance: float = 0.0
     rods = outcome.fit.placement.apply(mesh.vertices) @ turn.T
     joints = outcome.fit.placement.apply(state.positions[design.joints]) @ turn.T
     scale = span / np.ptp(rods[:, :2], axis=0).max()
-    base = np.array([*(0.5 * (rods[:, :2].min(axis=0) + rods[:, :2].max(axis=0))), rods[:, 2].min() - clearance / scale])
+    low, high = rods.min(axis=0), rods.max(axis=0)
+    base = np.array([*(0.5 * (low + high)[:2]), low[2] - clearance / scale])
     rods, joints = scale * (rods - base), scale * (joints - base)
     breadth = scale * _breadth(scene, plain)
     bodies = [Body(rods, mesh.faces, colours[mesh.chains[mesh.faces[:, 0]]]), _balls(joints, 0.62 * breadth)]
@@ -102,8 +102,7 @@ def framed(image: np.ndarray) -> Figure:
 
 def _chain_colours(result: KitResult, chains: list) -> np.ndarray:
     """(n_chains, 3) the colour of every rod's part, as in the project's other pictures."""
-    tables = {kind: part_colours(len(values), number * _KIND_SHIFT)
-              for number, (kind, values) in enumerate(result.kit.parts.items())}
+    tables = kit_colours(result.kit.sizes)
     return np.array([_WOOD if piece is None else tables[piece.kind][piece.part] for piece in chains])
 
 
@@ -159,7 +158,10 @@ def _balls(centres: np.ndarray, diameter: float) -> Body:
 
 
 def _person(place: np.ndarray, facing: float) -> Body:
-    """A standing person, 1.72 m, who looks along an azimuth (rad): a stack of ellipses for legs, coat and head, as in an architect's model."""
+    """A standing person, 1.72 m, who looks along an azimuth (rad).
+
+    A stack of ellipses for legs, coat and head, as in an architect's model.
+    """
     profile = np.array([  # height, half-width and half-depth, m
         [0.00, 0.085, 0.12], [0.05, 0.085, 0.10], [0.45, 0.10, 0.085], [0.80, 0.165, 0.11], [1.00, 0.165, 0.115],
         [1.22, 0.19, 0.12], [1.38, 0.215, 0.115], [1.43, 0.15, 0.085], [1.46, 0.058, 0.06], [1.50, 0.06, 0.065],
