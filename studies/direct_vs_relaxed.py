@@ -36,8 +36,8 @@ def main() -> None:
     report.figure("deviations", draw_comparison(rows),
                   "Largest deviation of every design after each stage, logarithmic. A cross at the top: no equilibrium "
                   "was found, or Exudyn didn't confirm it.", alt="Deviation of all designs after the four stages")
-    report.table("designs", rows, "Deviations in % of the bounding-box diagonal; energy: elastic, relative to the input "
-                 "design's. A dash: no equilibrium.")
+    report.table("designs", rows, "Deviations in % of the bounding-box diagonal; energy: elastic, relative to the "
+                 "input design's. A dash: no equilibrium.")
 
     # 3. The designs themselves, class by class.
     for name, result in results.items():
@@ -45,9 +45,9 @@ def main() -> None:
         elements = sum(design.n_elements for design in result.designs)
         report.section(name, f"{sizes} parts realise {elements} elements of {len(result.designs)} designs.")
         report.figure(name.replace(" ", "_"), draw_designs(most_changed(drawn_stages(result, STAGES))),
-                      "Equilibria at their best placement on the target; grey: the input design. Joints are coloured by "
-                      f"their deviation. Of {len(result.designs)} designs those that direct projection leaves farthest "
-                      "off are shown.",
+                      "Equilibria at their best placement on the target; grey: the input design. Joints are coloured "
+                      f"by their deviation. Of {len(result.designs)} designs those that direct projection leaves "
+                      "farthest off are shown.",
                       alt=f"The {name} after direct projection, unrelaxed, relaxed and assigned")
     report.save({"finding": outcome, "designs": rows})
 

@@ -40,11 +40,11 @@ def main() -> None:
               and case["parts"]["linear"] > failed["parts"]["linear"]]
     rescued = [min(group, key=lambda case: case["at the parts %"]) for group in (heavier, larger) if group]
     shown = [failed, *rescued]
-    finding = (f"{len(snapped)} of {len(cases)} cases snap on the way to their parts. With {label_text(failed)} a joint "
-               f"jumps {failed['snap %']:.0f} % of the box at {failed['snap at']:.0%} of the way, and the design ends "
+    finding = (f"{len(snapped)} of {len(cases)} cases snap on the way to their parts. With {label_text(failed)} a "
+               f"joint jumps {failed['snap %']:.0f} % of the box at {failed['snap at']:.0%} of the way, and the design ends "
                f"{failed['at the parts %']:.1f} % off; "
-               + " and ".join(f"with {label_text(case)} it stays in its state and ends {case['at the parts %']:.1f} % off"
-                              for case in rescued) + ".")
+               + " and ".join(f"with {label_text(case)} it stays in its state and ends "
+                              f"{case['at the parts %']:.1f} % off" for case in rescued) + ".")
     report = study.report(finding)
     report.figure("paths", draw_paths(shown),
                   "The failure and its rescues on their way to the parts. A snap shows as one step in which a joint "
@@ -56,9 +56,10 @@ def main() -> None:
                   "Before the way to the parts (left), after the snap, and rescued.",
                   alt="The design relaxed, after its snap, and rescued")
     report.section("All cases")
-    report.figure("map", draw_map(cases), "Largest deviation of the joints at the parts, % of the box, before these are "
-                  "tuned. Framed: a snap, and how far the joint jumped. Far off without a frame: the design got there in "
-                  "several steps, none of which stands out, so the watch on the path alone doesn't tell.", alt="Deviation for all kits and weights")
+    report.figure("map", draw_map(cases), "Largest deviation of the joints at the parts, % of the box, before these "
+                  "are tuned. Framed: a snap, and how far the joint jumped. Far off without a frame: the design got there "
+                  "in several steps, none of which stands out, so the watch on the path alone doesn't tell.",
+                  alt="Deviation for all kits and weights")
     fields = ("relaxed %", "at the parts %", "snap at", "snap %")
     rows = [{"linear": case["parts"]["linear"], "angular": case["parts"]["angular"], "w_c": case["weight"],
              **{field: case.get(field) for field in fields}} for case in cases]

@@ -2,16 +2,16 @@
 
     python studies/kit_size_tradeoff.py [--quick] [--out DIR] [--jobs N] [--scheduler ADDRESS] [--resume]
 
-How many parts are enough? Kits for conformals 1 to 5 are found with 5 angular and 25, 20, 16, 12, 10, 8, 6, 4, 3 and 2
-linear parts. The largest kit is found from scratch, in both stages; every other one starts from the next larger kit: the
-elements which that one realises are clustered into fewer parts, and the assigned stage optimises these and which part
-serves which element.
+How many parts are enough? Kits for conformals 1 to 5 are found with 5 angular and 25, 20, 16, 12, 10, 8, 6, 4, 3 and
+2 linear parts. The largest kit is found from scratch, in both stages; every other one starts from the next larger
+kit: the elements which that one realises are clustered into fewer parts, and the assigned stage optimises these and
+which part serves which element.
 
-Deviations are distances of the joints from the target surfaces, in % of their bounding-box diagonals; every state is an
-equilibrium that Exudyn confirmed. Kit size counts pieces to make, as many of each part as the design that needs most of
-it, in % of the elements of all designs: 20 % at best for five designs. The knee is the point farthest below the straight
-line from the first to the last point, both axes scaled to [0, 1] (the rule of Satopaa et al., 2011), on the curve of the
-smallest largest deviation that at most so many parts give.
+Deviations are distances of the joints from the target surfaces, in % of their bounding-box diagonals; every state is
+an equilibrium that Exudyn confirmed. Kit size counts pieces to make, as many of each part as the design that needs
+most of it, in % of the elements of all designs: 20 % at best for five designs. The knee is the point farthest below
+the straight line from the first to the last point, both axes scaled to [0, 1] (the rule of Satopaa et al., 2011), on
+the curve of the smallest largest deviation that at most so many parts give.
 """
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ def main() -> None:
     files = tasks[0].settings["files"]
     first, last = rows[0], rows[-1]
     finding = (f"From {first['linear']} to {last['linear']} linear parts the largest deviation of {len(files)} designs "
-               f"goes from {shown(first['max %'])} to {shown(last['max %'])}, the kit from {first['kit size %']:.0f} to "
-               f"{last['kit size %']:.0f} % of the elements")
-    finding += "." if at is None else (f"; the knee is at {sizes[at]} linear parts, with {shown(rows[at]['max %'])} and "
-                                       f"{rows[at]['kit size %']:.0f} %.")
+               f"goes from {shown(first['max %'])} to {shown(last['max %'])}, the kit from {first['kit size %']:.0f} "
+               f"to {last['kit size %']:.0f} % of the elements")
+    finding += "." if at is None else (f"; the knee is at {sizes[at]} linear parts, with {shown(rows[at]['max %'])} "
+                                       f"and {rows[at]['kit size %']:.0f} %.")
     report = study.report(finding)
     report.figure("tradeoff", draw_tradeoff(rows, "linear", at), "Figures of every kit against its number of linear "
                   "parts; the dotted line marks the knee.", alt="deviation, kit size, energy, time over linear parts")

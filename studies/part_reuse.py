@@ -5,9 +5,9 @@
 The kits of the study of kit sizes (conformals 1 to 5, 5 angular and 2 to 25 linear parts) are looked at again: which
 design uses which part how often, and how much of its pieces any set of designs shares.
 
-The reuse of a set of designs is the number of pieces that all of them use over the number that any of them uses; for two
-designs that is the Jaccard index of their multisets of pieces. The average is over all sets of two or more designs.
-Kits that the other study left in its folder are taken from there, missing ones are computed.
+The reuse of a set of designs is the number of pieces that all of them use over the number that any of them uses; for
+two designs that is the Jaccard index of their multisets of pieces. The average is over all sets of two or more
+designs. Kits that the other study left in its folder are taken from there, missing ones are computed.
 """
 from __future__ import annotations
 
@@ -47,16 +47,16 @@ def main() -> None:
     pairs = [(detail["jaccard"][i][j], names[i], names[j]) for i in range(len(names)) for j in range(i)]
     most, least = max(pairs), min(pairs)
     shared = int(np.count_nonzero(part_users(counts) == len(names)))
-    finding = (f"Of the {len(labels)} parts of the kit with {size} linear ones, {shared} are used by all {len(names)} designs; "
-               f"{most[1]} and {most[2]} share most ({most[0]:.0%} of their pieces), {least[1]} and {least[2]} least "
-               f"({least[0]:.0%}). From {rows[0]['linear']} to {rows[-1]['linear']} linear parts the average reuse goes "
-               f"from {rows[0]['average reuse']:.2f} to {rows[-1]['average reuse']:.2f}.")
+    finding = (f"Of the {len(labels)} parts of the kit with {size} linear ones, {shared} are used by all {len(names)} "
+               f"designs; {most[1]} and {most[2]} share most ({most[0]:.0%} of their pieces), {least[1]} and {least[2]} "
+               f"least ({least[0]:.0%}). From {rows[0]['linear']} to {rows[-1]['linear']} linear parts the average reuse "
+               f"goes from {rows[0]['average reuse']:.2f} to {rows[-1]['average reuse']:.2f}.")
 
     # 3. The report.
     report = study.report(finding)
     report.figure("sharing", draw_sharing(names, counts, labels, jaccard_matrix(counts)),
-                  f"The kit with {size} linear parts (L) and its angular ones (A). Left: how many pieces of each part a "
-                  "design is built of. Right: share of the pieces that two designs have in common.",
+                  f"The kit with {size} linear parts (L) and its angular ones (A). Left: how many pieces of each part "
+                  "a design is built of. Right: share of the pieces that two designs have in common.",
                   alt="Pieces of each part by design, and the Jaccard index of each pair")
     report.figure("subsets", draw_subsets(detail["subsets"], names), "Every set of two or more designs.",
                   alt="Reuse of all sets of designs, by their size")

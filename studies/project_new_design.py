@@ -2,13 +2,14 @@
 
     python studies/project_new_design.py [--quick] [--out DIR] [--jobs N] [--scheduler ADDRESS] [--resume]
 
-The kit of the study of kit sizes with 12 linear and 5 angular parts was made for conformals 1 to 5. Here conformal 6, which
-it has never seen, is built of the same parts, once for each of several weights w_c of the projection energy.
+The kit of the study of kit sizes with 12 linear and 5 angular parts was made for conformals 1 to 5. Here conformal 6,
+which it has never seen, is built of the same parts, once for each of several weights w_c of the projection energy.
 
-Direct: every input element becomes its nearest part. Relaxed: all elements move, drawn to their nearest parts by w_c and
-held by the target. Built: each relaxed element becomes its nearest part. Exchanged: elements then get other parts where the
-objective gains by that. An element is changed when its part, or the way in which that is built in, isn't the one of the
-direct projection. Deviations are distances of the joints from the target surface; every state is confirmed by Exudyn.
+Direct: every input element becomes its nearest part. Relaxed: all elements move, drawn to their nearest parts by w_c
+and held by the target. Built: each relaxed element becomes its nearest part. Exchanged: elements then get other parts
+where the objective gains by that. An element is changed when its part, or the way in which that is built in, isn't
+the one of the direct projection. Deviations are distances of the joints from the target surface; every state is
+confirmed by Exudyn.
 """
 from __future__ import annotations
 
@@ -51,9 +52,10 @@ def main() -> None:
     if built:
         best = min(built, key=lambda row: row["reassigned J"])
         finding = (f"{design.name} deviates by {shown(direct)} when its elements become their nearest parts, by "
-                   f"{shown(best['built max %'])} when they are relaxed before (w_c = {best['w_c']:.3g} times the weight of the "
-                   f"fit), and by {shown(best['reassigned max %'])} after exchanges; {best['reassigned changes']} of its "
-                   f"{design.n_elements} elements then have other parts than in the direct projection.")
+                   f"{shown(best['built max %'])} when they are relaxed before (w_c = {best['w_c']:.3g} times the "
+                   f"weight of the fit), and by {shown(best['reassigned max %'])} after exchanges; "
+                   f"{best['reassigned changes']} of its {design.n_elements} elements then have other parts than in the "
+                   "direct projection.")
 
     # 3. The report.
     report = study.report(finding)
@@ -62,8 +64,9 @@ def main() -> None:
     drawn = [tasks[k] for k in np.unique(np.linspace(0, len(tasks) - 1, 6).round().astype(int))]
     states = [(f"w_c = {task.settings['factor']:.3g}", found[task.name]["reassigned"]) for task in drawn
               if "failed" not in found[task.name]]
-    report.figure("changes", draw_changes(design, states), "The design built of the kit, after exchanges: elements with "
-                  "other parts than after direct projection.", alt="The design for several w_c, changed elements coloured")
+    report.figure("changes", draw_changes(design, states), "The design built of the kit, after exchanges: elements "
+                  "with other parts than after direct projection.",
+                  alt="The design for several w_c, changed elements in colour")
     report.table("weights", rows, "w_c over the weight of the fit; deviations in % of the bounding box; a dash: no "
                  "equilibrium was found.")
     report.save({"finding": finding, "weights": rows, "design": design.name})

@@ -47,18 +47,19 @@ def main() -> None:
     weakest = max(rows, key=lambda row: row["predicted rms %"])
     finding = (f"Errors of 0.1 % and 0.1° move the joints of {len(every)} designs by {rows_median(rows):.2g} % of the "
                f"box (rms, median of the designs); the most sensitive is {weakest['design']} with "
-               f"{weakest['predicted rms %']:.2g} %. Prediction and sampling agree within a factor of {ratio:.2f} there; "
-               f"the prediction misses {np.median(missed[factors[0]]):.1%} of the displacement at {factors[0]:g} times "
-               f"the tolerance and {np.median(missed[factors[-1]]):.0%} at {factors[-1]:g} times.")
+               f"{weakest['predicted rms %']:.2g} %. Prediction and sampling agree within a factor of {ratio:.2f} "
+               f"there; the prediction misses {np.median(missed[factors[0]]):.1%} of the displacement at {factors[0]:g} "
+               f"times the tolerance and {np.median(missed[factors[-1]]):.0%} at {factors[-1]:g} times.")
     report = study.report(finding)
     report.figure("agreement", draw_agreement(classes),
                   f"Above: lines are the prediction, markers {samples} re-solved samples each. Below: the part of the "
-                  "samples' displacements that their own prediction misses; it grows in proportion to the errors as long "
-                  "as the second order governs it.", alt="Predicted and sampled displacements against the errors' size")
-    report.table("designs", rows, "At the tolerance itself. By lengths: their share of the mean square displacement, the "
-                 "rest is by angles. Planned: without errors.")
+                  "samples' displacements that their own prediction misses; it grows in proportion to the errors as "
+                  "long as the second order governs it.",
+                  alt="Predicted and sampled displacements against the errors' size")
+    report.table("designs", rows, "At the tolerance itself. By lengths: their share of the mean square displacement, "
+                 "the rest is by angles. Planned: without errors.")
     report.figure("joints", draw_designs(drawn_spreads(classes)),
-                  "Where the errors show: rms displacement of each joint at the tolerance itself, by the sensitivities.",
+                  "Where the errors show: rms displacement of each joint at the tolerance itself, by sensitivities.",
                   alt="Designs with joints coloured by their displacement")
     report.save({"finding": finding, "designs": rows, "missed": {f"{k:g}": v for k, v in missed.items()}})
 

@@ -54,8 +54,9 @@ def main() -> None:
 
     report.section("The method's course")
     report.figure("history", draw_history(histories(result)),
-                  "The objective and its terms after every accepted step. At a dashed line the weight of the projection "
-                  "energy rises, or elements get other parts.", alt="Objective against steps for both stages")
+                  "The objective and its terms after every accepted step. At a dashed line the weight of the "
+                  "projection energy rises, or elements get other parts.",
+                  alt="Objective against steps for both stages")
     drawn = [DrawnDesign(design.name, [start, *design.states], design.wanted) for design, start in
              zip(drawn_stages(result, ("relaxed", "assigned")), input_states(result, "input"))]
     report.figure("designs", draw_designs(drawn), "At the start, between the stages, and at the end.",

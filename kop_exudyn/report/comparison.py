@@ -36,8 +36,8 @@ def finding(rows: Sequence[Row]) -> str:
     """What the rows say, in a sentence or two."""
     direct, unrelaxed, assigned = (_values(rows, f"{stage} max %") for stage in ("direct", "unrelaxed", "assigned"))
     sentences = [f"Over {len(rows)} designs the median of the largest deviation falls from {np.median(direct):.2g} % "
-                 f"(direct) and {np.median(unrelaxed):.2g} % (unrelaxed) to {np.median(assigned):.2g} % (assigned); the "
-                 f"worst design ends at {max(assigned):.2g} %, after direct projection it is {max(direct):.2g} % off."]
+                 f"(direct) and {np.median(unrelaxed):.2g} % (unrelaxed) to {np.median(assigned):.2g} % (assigned); "
+                 f"the worst design ends at {max(assigned):.2g} %, after direct projection it is {max(direct):.2g} % off."]
     failed = [f"{row['design']} ({row['no equilibrium']})" for row in rows if row["no equilibrium"] != "–"]
     if failed:
         sentences.append(f"No equilibrium was found for {', '.join(failed)}.")

@@ -49,7 +49,7 @@ class History:
 
 
 def draw_history(histories: Sequence[History]) -> Figure:
-    """One panel a stage, logarithmic, on one scale; where w_c changes or a round begins there is a line that says so."""
+    """One panel a stage, logarithmic, on one scale; a line where w_c changes or a round begins says so."""
     names = list(dict.fromkeys(name for history in histories for step in history.steps for name in step.terms))
     colours = {name: CYCLE[k % len(CYCLE)] for k, name in enumerate(names)}
     widths = [max(len(history.steps), 1) for history in histories]

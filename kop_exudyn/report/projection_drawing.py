@@ -21,7 +21,7 @@ _STATES = (("relaxed", "relaxed elements", "o-", "green"), ("built", "built of p
 
 
 def draw_projection(rows: Sequence[Mapping[str, Any]]) -> Figure:
-    """Deviation, elastic energy, distance to the parts and changed elements over w_c, from rows of the study's table."""
+    """Deviation, elastic energy, distance to the parts and changed elements over w_c, from the rows of a table."""
     weights = [row["w_c"] for row in rows]
     with style():
         figure, axes = plt.subplots(2, 2, figsize=(7.4, 5.4), layout="constrained", sharex=True)
@@ -86,7 +86,8 @@ def _draw_changed(ax: Axes, placed: PlacedPieces, state: Mapping[str, Any]) -> N
     other = [parameter in changed for parameter in scene.chain_parameters.tolist()]
     for kept in (True, False):  # changed ones above the others
         ax.add_collection(LineCollection([line for line, is_other in zip(lines, other) if is_other != kept],
-                                         colors=FAINT if kept else PALETTE["vermillion"], linewidths=1.0 if kept else 1.8))
+                                         colors=FAINT if kept else PALETTE["vermillion"],
+                                         linewidths=1.0 if kept else 1.8))
     corners = [corner.body for parameter, corner in placed.corners.items() if parameter in changed]
     ax.plot(*places[corners].T, "o", color=PALETTE["blue"], markersize=2.6)
     ax.set_aspect("equal")

@@ -45,12 +45,14 @@ def draw_subsets(subsets: Sequence[Mapping[str, Any]], names: Sequence[str]) -> 
             ax.hlines(np.mean(values), size - 0.22, size + 0.22, color=PALETTE["vermillion"], linewidth=2,
                       label="mean" if size == sizes[0] else None)
             for s, place in ((own[-1], 6), (own[0], -12))[: min(2, len(own))]:
-                few = s["designs"] if size <= len(names) / 2 else [k for k in range(len(names)) if k not in s["designs"]]
+                few = s["designs"] if size <= len(names) / 2 else [
+                    k for k in range(len(names)) if k not in s["designs"]]
                 text = ", ".join(names[k] for k in few)
                 text = text if few is s["designs"] else f"all but {text}" if few else "all"
                 ax.annotate(text, (size, s["reuse"]), xytext=(0, place), textcoords="offset points", ha="center",
                             fontsize=7.5, color=QUIET)
-        ax.set(xlabel="designs in the set", ylabel="pieces used by all / by any", xlim=(sizes[0] - 0.5, sizes[-1] + 0.5))
+        ax.set(xlabel="designs in the set", ylabel="pieces used by all / by any",
+               xlim=(sizes[0] - 0.5, sizes[-1] + 0.5))
         ax.margins(y=0.18)
         ax.set_xticks(sizes)
         ax.legend(loc="upper right")
@@ -84,7 +86,8 @@ def _table(ax: Axes, values: np.ndarray, texts: Sequence[str], columns: Sequence
     for (row, column), text in zip(np.ndindex(values.shape), texts):
         dark = np.dot(colours(values[row, column] / most)[:3], (0.299, 0.587, 0.114)) < 0.55
         ax.text(column + 0.5, row + 0.5, text, ha="center", va="center", fontsize=7.5, color="white" if dark else INK)
-    ax.set(xticks=np.arange(len(columns)) + 0.5, xticklabels=columns, yticks=np.arange(len(rows)) + 0.5, yticklabels=rows)
+    ax.set(xticks=np.arange(len(columns)) + 0.5, xticklabels=columns,
+           yticks=np.arange(len(rows)) + 0.5, yticklabels=rows)
     ax.invert_yaxis()
     ax.grid(visible=False)
     ax.tick_params(length=0)
