@@ -55,9 +55,9 @@ def main() -> None:
     shown = min(sizes, key=lambda size: abs(size - SHOWN))
     plain, cheap = (next(r for r in rows if r["parts"] == shown and r["cost"] == cost) for cost in (None, costs[-1]))
     finding = (f"With {shown} linear parts, slits (cost {costs[-1]:g}) of {cheap['mean slit %']:.0f} % of the median "
-               f"length on average bring the projection energy from {plain['projection energy']:.2g} to {cheap['projection energy']:.2g}, and "
-               f"the largest deviation of {len(files)} designs from {percent(plain['max %'])} to {percent(cheap['max %'])} "
-               "without optimising their shapes.")
+               f"length on average bring the projection energy from {plain['projection energy']:.2g} to "
+               f"{cheap['projection energy']:.2g}, and the largest deviation of {len(files)} designs from "
+               f"{percent(plain['max %'])} to {percent(cheap['max %'])} without optimising their shapes.")
 
     # 3. The report.
     report = study.report(finding)
@@ -68,8 +68,8 @@ def main() -> None:
                               for group in design.groups if group.kind == "linear"])
     kits = [("no slits" if cost is None else f"cost {cost:g}", parts_of(found[shown, cost]["kit"])) for cost in costs]
     report.figure("intervals", draw_lengths(lengths, kits), "Above: all lengths of the input elements, two of "
-                  f"each. Below: what the {shown} parts of each kit realise, a line a part: ticks mark its two lengths, bars the reach of "
-                  "its slits.",
+                  f"each. Below: what the {shown} parts of each kit realise, a line a part: ticks mark its two "
+                  "lengths, bars the reach of its slits.",
                   alt="Lengths of elements, and intervals that parts realise")
     report.table("cases", rows, "Cost –: no slits. Slits and distances in % of the median length, deviations "
                  "(max, mean) in % of the bounding box.")

@@ -1,7 +1,7 @@
 """Pictures of solids: triangles seen in perspective, lit by a sun and by the sky, with soft shadows.
 
 A depth buffer finds what the camera sees (Catmull, 1974); depth buffers of many lights find what each of them sees
-(Williams, 1978). The sun is a cone of lights, the sky a hemisphere of them, which darkens corners and the ground beneath
+(Williams, 1978). The sun is a cone of lights, the sky a hemisphere of them, which darkens corners and ground beneath
 things. All in numba: no graphics card, no window, the same picture everywhere.
 """
 from __future__ import annotations
