@@ -82,13 +82,13 @@ def strain_displacement(R0, p, phi, c, c1, A, D, B):
         B[r, 5] += A[r, 0] * p[1] - A[r, 1] * p[0]
 
 
-@nb.njit(cache=True)
-def geometric_stiffness(R0, p, phi, c, c1, c2, A, sigma, P, X, T, H):
-    """Add G(sigma), the stress part of the Hessian, to the upper triangle of H (12,12).
+@nb.njit(cache=True, fastmath={"contract"})
+def geometric_stiffness(R0, p, phi, c, c1, c2, A, sigma, X, T, H):
+    """Add G(sigma), the stress part of the Hessian, to the blocks of w_0, dx_1, w_1 in H (12,12).
 
     G collects the second variations of (u, phi) contracted with sigma: dphi.Mff dphi + 2 dphi.Mfp dp from A(phi) p,
-    the derivative of the Jacobians that turn w_0, w_1 into dphi, and the second variation of p. P (3,12) is the
-    phi part of B; X (3,12) and T (5,3,3) are scratch.
+    the derivative of the Jacobians that turn w_0, w_1 into dphi, and the second variation of p. Blocks below the
+    diagonal are left alone. X (3,9) and T (5,3,3) are scratch.
     """
     su, sp = sigma[:3], sigma[3:]
     s, pp = dot3(phi, phi), dot3(phi, p)
@@ -122,37 +122,37 @@ def geometric_stiffness(R0, p, phi, c, c1, c2, A, sigma, P, X, T, H):
     add_hat(N1, g, -0.25)
     add_hat(N0, g, 0.25)
 
-    # X = M P + Q dp + (N1 w_1 - N0 w_0)/2, with dp = R0^T (dx_1 - dx_0) + hat(p) w_0
+    # P^T X + X^T P with P = (-A, 0, A^T), the variation of phi, and X = M P + Q dp + (N1 w_1 - N0 w_0)/2, where
+    # dp = R0^T dx_1 + hat(p) w_0
     for r in range(3):
         for k in range(3):
-            move = Q[r, 0] * R0[k, 0] + Q[r, 1] * R0[k, 1] + Q[r, 2] * R0[k, 2]
-            X[r, k] = -move
-            X[r, 6 + k] = move
-            X[r, 3 + k] = M[r, 0] * P[0, 3 + k] + M[r, 1] * P[1, 3 + k] + M[r, 2] * P[2, 3 + k] - N0[r, k]
-            X[r, 9 + k] = M[r, 0] * P[0, 9 + k] + M[r, 1] * P[1, 9 + k] + M[r, 2] * P[2, 9 + k] + N1[r, k]
-        X[r, 3] += Q[r, 1] * p[2] - Q[r, 2] * p[1]
-        X[r, 4] += Q[r, 2] * p[0] - Q[r, 0] * p[2]
-        X[r, 5] += Q[r, 0] * p[1] - Q[r, 1] * p[0]
-    for a in range(12):
-        for b in range(a, 12):
-            H[a, b] += P[0, a] * X[0, b] + P[1, a] * X[1, b] + P[2, a] * X[2, b] \
-                + X[0, a] * P[0, b] + X[1, a] * P[1, b] + X[2, a] * P[2, b]
+            X[r, k] = -(M[r, 0] * A[0, k] + M[r, 1] * A[1, k] + M[r, 2] * A[2, k]) - N0[r, k]
+            X[r, 3 + k] = Q[r, 0] * R0[k, 0] + Q[r, 1] * R0[k, 1] + Q[r, 2] * R0[k, 2]
+            X[r, 6 + k] = M[r, 0] * A[k, 0] + M[r, 1] * A[k, 1] + M[r, 2] * A[k, 2] + N1[r, k]
+        X[r, 0] += Q[r, 1] * p[2] - Q[r, 2] * p[1]
+        X[r, 1] += Q[r, 2] * p[0] - Q[r, 0] * p[2]
+        X[r, 2] += Q[r, 0] * p[1] - Q[r, 1] * p[0]
+    for i in range(3):
+        for k in range(9):
+            H[3 + i, 3 + k] -= A[0, i] * X[0, k] + A[1, i] * X[1, k] + A[2, i] * X[2, k]
+        for k in range(3):
+            H[9 + i, 9 + k] += A[i, 0] * X[0, 6 + k] + A[i, 1] * X[1, 6 + k] + A[i, 2] * X[2, 6 + k]
+    for i in range(9):
+        for k in range(3):
+            H[3 + i, 9 + k] += X[0, i] * A[k, 0] + X[1, i] * A[k, 1] + X[2, i] * A[k, 2]
+        if i < 3:
+            for k in range(3):
+                H[3 + i, 3 + k] -= X[0, i] * A[0, k] + X[1, i] * A[1, k] + X[2, i] * A[2, k]
 
     # f . d2p
     pf = dot3(p, f)
-    for a in range(3):
-        for b in range(a, 3):
-            H[3 + a, 3 + b] += 0.5 * (f[a] * p[b] + p[a] * f[b])
-        H[3 + a, 3 + a] -= pf
-        y0 = f[1] * R0[a, 2] - f[2] * R0[a, 1]
-        y1 = f[2] * R0[a, 0] - f[0] * R0[a, 2]
-        y2 = f[0] * R0[a, 1] - f[1] * R0[a, 0]
-        H[3, 6 + a] += y0
-        H[4, 6 + a] += y1
-        H[5, 6 + a] += y2
-        H[a, 3] -= y0
-        H[a, 4] -= y1
-        H[a, 5] -= y2
+    for i in range(3):
+        for k in range(3):
+            H[3 + i, 3 + k] += 0.5 * (f[i] * p[k] + p[i] * f[k])
+        H[3 + i, 3 + i] -= pf
+        H[3, 6 + i] += f[1] * R0[i, 2] - f[2] * R0[i, 1]
+        H[4, 6 + i] += f[2] * R0[i, 0] - f[0] * R0[i, 2]
+        H[5, 6 + i] += f[0] * R0[i, 1] - f[1] * R0[i, 0]
 
 
 @nb.njit(cache=True)
@@ -170,37 +170,56 @@ def element_energy(x0, R0, x1, R1, L, gamma, K, p, phi, R, e):
     return 0.5 * W / L
 
 
-@nb.njit(cache=True)
-def element_hessian(R0, L, K, p, phi, sigma, A, D, B, P, X, T, H):
-    """Fill B (6,12) and the symmetric H (12,12) = B^T (K/L) B + G(sigma)."""
+@nb.njit(cache=True, fastmath={"contract"})
+def element_hessian(R0, L, K, p, phi, sigma, A, D, B, KB, X, T, H):
+    """Fill B (6,12) and the symmetric H (12,12) = B^T (K/L) B + G(sigma). KB (6,12), X and T are scratch.
+
+    Only blocks of w_0, dx_1 and w_1 are computed: the energy depends on x_1 - x_0, so those of dx_0 are minus dx_1's.
+    phi does not depend on positions, so products with columns of dx_1 have three rows.
+    """
     c, c1, c2 = bend_coefficient(dot3(phi, phi))
     strain_displacement(R0, p, phi, c, c1, A, D, B)
-    for r in range(3):
-        for k in range(12):
-            P[r, k] = B[3 + r, k]
-    for a in range(12):
-        for b in range(a, 12):
-            v = 0.0
-            for r in range(6):
-                v += B[r, a] * K[r] * B[r, b]
-            H[a, b] = v / L
-    geometric_stiffness(R0, p, phi, c, c1, c2, A, sigma, P, X, T, H)
-    for a in range(12):
-        for b in range(a):
-            H[a, b] = H[b, a]
+    for r in range(6):
+        for k in range(3, 12):
+            KB[r, k] = K[r] / L * B[r, k]
+    for i in range(3, 12):
+        for k in range(3, 12):
+            H[i, k] = KB[0, i] * B[0, k] + KB[1, i] * B[1, k] + KB[2, i] * B[2, k]
+    for i in range(3):
+        for k in range(3):
+            H[3 + i, 3 + k] += KB[3, 3 + i] * B[3, 3 + k] + KB[4, 3 + i] * B[4, 3 + k] + KB[5, 3 + i] * B[5, 3 + k]
+            H[3 + i, 9 + k] += KB[3, 3 + i] * B[3, 9 + k] + KB[4, 3 + i] * B[4, 9 + k] + KB[5, 3 + i] * B[5, 9 + k]
+            H[9 + i, 9 + k] += KB[3, 9 + i] * B[3, 9 + k] + KB[4, 9 + i] * B[4, 9 + k] + KB[5, 9 + i] * B[5, 9 + k]
+    geometric_stiffness(R0, p, phi, c, c1, c2, A, sigma, X, T, H)
+    for i in range(3):
+        for k in range(3):
+            H[6 + i, 3 + k] = H[3 + k, 6 + i]
+            H[9 + i, 3 + k] = H[3 + k, 9 + i]
+            H[9 + i, 6 + k] = H[6 + k, 9 + i]
+            if k < i:
+                for at in (3, 6, 9):
+                    H[at + i, at + k] = H[at + k, at + i]
+    for i in range(3):
+        for k in range(3, 12):
+            H[i, k] = -H[6 + i, k]
+        for k in range(3):
+            H[i, k] = H[6 + i, 6 + k]
+    for i in range(3, 12):
+        for k in range(3):
+            H[i, k] = -H[i, 6 + k]
 
 
 @nb.njit(cache=True)
 def _evaluate(x0, R0, x1, R1, L, gamma, K, sigma, mixed, W, G, H, e, B):
     p, phi, R = np.empty(3), np.empty(3), np.empty((3, 3))
-    A, D, P, X = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 12)), np.empty((3, 12))
+    A, D, KB, X = np.empty((3, 3)), np.empty((3, 3)), np.empty((6, 12)), np.empty((3, 9))
     T = np.empty((5, 3, 3))
     stress = np.empty(6)
     for n in range(len(W)):
         W[n] = element_energy(x0[n], R0[n], x1[n], R1[n], L[n], gamma[n], K[n], p, phi, R, e[n])
         for r in range(6):
             stress[r] = sigma[n, r] if mixed else K[n, r] * e[n, r] / L[n]
-        element_hessian(R0[n], L[n], K[n], p, phi, stress, A, D, B[n], P, X, T, H[n])
+        element_hessian(R0[n], L[n], K[n], p, phi, stress, A, D, B[n], KB, X, T, H[n])
         for k in range(12):
             v = 0.0
             for r in range(6):

@@ -102,8 +102,8 @@ def transform_columns(M, n_rows, at6, plain, T, out, at7):
 
 @nb.njit(cache=True)
 def transform_rows(M, at6, plain, T, out, at7):
-    """out[at7:at7+7, :] = T^T M[at6:at6+6, :], for 14 columns."""
-    for c in range(14):
+    """out[at7:at7+7, at7:] = T^T M[at6:at6+6, at7:], for 14 columns."""
+    for c in range(at7, 14):
         if plain:
             for r in range(6):
                 out[at7 + r, c] = M[at6 + r, c]
@@ -163,7 +163,7 @@ def assemble_rods(
     d0, d1 = np.zeros(3), np.zeros(3)
     T0, T1 = np.empty((6, 7)), np.empty((6, 7))
     p, phi, R = np.empty(3), np.empty(3), np.empty((3, 3))
-    A, D, P, X, T = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 12)), np.empty((3, 12)), np.empty((5, 3, 3))
+    A, D, KB, X, T = np.empty((3, 3)), np.empty((3, 3)), np.empty((6, 12)), np.empty((3, 9)), np.empty((5, 3, 3))
     B, H, M, H14 = np.empty((6, 12)), np.empty((12, 12)), np.empty((12, 14)), np.zeros((14, 14))
     G, sigma = np.empty(12), np.empty(6)
     elastic = 0.0
@@ -188,7 +188,7 @@ def assemble_rods(
             c, c1, _ = bend_coefficient(phi[0] ** 2 + phi[1] ** 2 + phi[2] ** 2)
             strain_displacement(R0, p, phi, c, c1, A, D, B)
         else:
-            element_hessian(R0, L[e], K[e], p, phi, stress[e] if mixed else sigma, A, D, B, P, X, T, H)
+            element_hessian(R0, L[e], K[e], p, phi, stress[e] if mixed else sigma, A, D, B, KB, X, T, H)
         for k in range(12):
             G[k] = B[0, k] * sigma[0] + B[1, k] * sigma[1] + B[2, k] * sigma[2] \
                 + B[3, k] * sigma[3] + B[4, k] * sigma[4] + B[5, k] * sigma[5]
@@ -206,7 +206,7 @@ def assemble_rods(
         if order == GRADIENT:
             continue
 
-        transform_columns(H, 12, 0, plain0, T0, M, 0)
+        transform_columns(H, 6, 0, plain0, T0, M, 0)  # of H14 the blocks on and above the diagonal are used
         transform_columns(H, 12, 6, plain1, T1, M, 7)
         transform_rows(M, 0, plain0, T0, H14, 0)
         transform_rows(M, 6, plain1, T1, H14, 7)
