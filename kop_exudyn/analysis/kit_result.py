@@ -94,8 +94,8 @@ class KitResult:
             "steps": {stage: self.stages[stage].steps for stage in ("relaxed", "assigned", "unrelaxed")
                       if stage in self.stages},
             "objective": {stage: self.stages[stage].value for stage in STAGES if stage in self.stages},
-            "jumps": [{"design": j.design, "fraction": j.fraction, "distance_percent": 100 * j.distance}
-                      for stage in self.stages.values() for j in stage.jumps],
+            "jumps": [{"stage": name, "design": j.design, "fraction": j.fraction, "distance_percent": 100 * j.distance}
+                      for name, stage in self.stages.items() for j in stage.jumps],
             "status": {stage: result.status for stage, result in self.stages.items() if result.status},
             "equilibria": self.equilibria, "newton_iterations": self.newton_iterations,
             "wall_s": self.wall_s, "peak_memory_mb": self.peak_memory_mb, "settings": dict(self.settings),

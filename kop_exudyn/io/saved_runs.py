@@ -11,7 +11,7 @@ from ..equilibrium.newton import Equilibrium, Start, solve
 from ..errors import InputError, SimulationFailure
 from ..kit.parts import Assignment, Kit
 from ..optimize.objective import DesignObjective, Evaluation, Reference, reference_of
-from ..optimize.stage_results import StageResult
+from ..optimize.stage_results import Jump, StageResult
 from ..scene.state import State
 from ..structures.base import Design, Role
 from .results import load_result, load_states
@@ -50,8 +50,15 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
                     for objective, entry, q in zip(objectives, data["designs"], realised)]
         if None not in outcomes:
             result.stages[stage] = StageResult(outcomes, kit, assignment, data["steps"].get(stage, 0),
-                                               data["objective"].get(stage), data["status"].get(stage, ""))
+                                               data["objective"].get(stage), data["status"].get(stage, ""),
+                                               _jumps(data, stage))
     return result
+
+
+def _jumps(data: Mapping[str, Any], stage: str) -> list[Jump]:
+    """The snaps before a stage; files of earlier versions don't tell of which stage theirs are."""
+    return [Jump(jump["design"], jump["fraction"], jump["distance_percent"] / 100)
+            for jump in data["jumps"] if jump.get("stage") == stage]
 
 
 def _named(designs: Sequence[Design], names: Sequence[str], path: Path) -> list[Design]:

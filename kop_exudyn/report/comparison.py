@@ -9,17 +9,18 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from ..analysis.kit_result import STAGES, KitResult
-from .style import PALETTE, QUIET, style
+from .style import INK, PALETTE, QUIET, style
 
 Row = Mapping[str, Any]
 
 _COLOURS = {"direct": PALETTE["vermillion"], "unrelaxed": PALETTE["orange"], "relaxed": PALETTE["sky"],
             "assigned": PALETTE["blue"]}
+_RING, _SNAPPED = 110, {"marker": "o", "facecolors": "none", "edgecolors": INK, "linewidths": 1.2}
 _MARKERS = {"direct": "s", "unrelaxed": "^", "relaxed": "D", "assigned": "o"}
 
 
 def comparison_rows(class_name: str, result: KitResult) -> list[dict[str, Any]]:
-    """One row a design: largest and mean deviations after every stage, energies, and which stages failed."""
+    """One row a design: largest and mean deviations after every stage, energies, which stages snapped and failed."""
     rows = []
     for n, design in enumerate(result.designs):
         found = {stage: result.summary(stage, n) for stage in STAGES if stage in result.stages}
@@ -27,6 +28,8 @@ def comparison_rows(class_name: str, result: KitResult) -> list[dict[str, Any]]:
         row |= {f"{stage} max %": _fit(found.get(stage), "max_percent") for stage in STAGES}
         row |= {f"{stage} mean %": _fit(found.get(stage), "mean_percent") for stage in ("direct", "assigned")}
         row |= {f"{stage} energy": found.get(stage, {}).get("energy_ratio") for stage in STAGES}
+        row["snapped"] = ", ".join(f"{stage} ({100 * jump.distance:.0f} %)" for stage in found
+                                   for jump in result.stages[stage].jumps if jump.design == design.name) or "–"
         row["no equilibrium"] = ", ".join(stage for stage, summary in found.items() if "failed" in summary) or "–"
         rows.append(row)
     return rows
@@ -37,7 +40,11 @@ def finding(rows: Sequence[Row]) -> str:
     direct, unrelaxed, assigned = (_values(rows, f"{stage} max %") for stage in ("direct", "unrelaxed", "assigned"))
     sentences = [f"Over {len(rows)} designs the median of the largest deviation falls from {np.median(direct):.2g} % "
                  f"(direct) and {np.median(unrelaxed):.2g} % (unrelaxed) to {np.median(assigned):.2g} % (assigned); "
-                 f"the worst design ends at {max(assigned):.2g} %, after direct projection it is {max(direct):.2g} % off."]
+                 f"the worst design ends at {max(assigned):.2g} %, after direct projection it is {max(direct):.2g} % "
+                 "off."]
+    snapped = [row["design"] for row in rows if row["snapped"].startswith("direct")]
+    sentences.append(f"On the way from the inputs to their nearest parts {len(snapped)} designs snap"
+                     + (f" ({', '.join(snapped)})." if snapped else "."))
     failed = [f"{row['design']} ({row['no equilibrium']})" for row in rows if row["no equilibrium"] != "–"]
     if failed:
         sentences.append(f"No equilibrium was found for {', '.join(failed)}.")
@@ -45,7 +52,7 @@ def finding(rows: Sequence[Row]) -> str:
 
 
 def draw_comparison(rows: Sequence[Row]) -> Figure:
-    """Every design a line, its stages markers on a logarithmic axis of the largest deviation."""
+    """Every design a line, its stages markers on a logarithmic axis of the largest deviation; rings: it snapped."""
     stages = [stage for stage in STAGES if any(row[f"{stage} max %"] is not None for row in rows)]
     values = [row[f"{stage} max %"] for row in rows for stage in stages if row[f"{stage} max %"]]
     low, high = 0.6 * min(values), 2.0 * max(values)
@@ -62,7 +69,8 @@ def draw_comparison(rows: Sequence[Row]) -> Figure:
         _mark_classes(ax, rows, low)
         for stage in stages:
             ax.scatter([], [], color=_COLOURS[stage], marker=_MARKERS[stage], s=34, label=stage)
-        figure.legend(loc="outside lower center", ncols=len(stages))
+        ax.scatter([], [], s=_RING, label="snapped on the way", **_SNAPPED)
+        figure.legend(loc="outside lower center", ncols=len(stages) + 1)
     return figure
 
 
@@ -73,8 +81,10 @@ def _draw_row(ax: Axes, y: int, row: Row, stages: Sequence[str], failed_at: floa
         ax.hlines(y, min(there), max(there), color="#d8d8d8", linewidth=3, zorder=1)
     for stage, value in found.items():
         missing = value is None
-        ax.scatter(failed_at if missing else value, y, color=_COLOURS[stage], marker="x" if missing else _MARKERS[stage],
-                   s=34, zorder=3)
+        x = failed_at if missing else value
+        ax.scatter(x, y, color=_COLOURS[stage], marker="x" if missing else _MARKERS[stage], s=34, zorder=3)
+        if f"{stage} (" in row["snapped"]:
+            ax.scatter(x, y, s=_RING, zorder=4, **_SNAPPED)
 
 
 def _mark_classes(ax: Axes, rows: Sequence[Row], low: float) -> None:

@@ -9,6 +9,7 @@ from kop_exudyn.io.results import load_result, save_result, save_states
 from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.optimize.fitting import TargetFitting
 from kop_exudyn.optimize.job import JobSettings, run_job
+from kop_exudyn.optimize.stage_results import Jump
 from kop_exudyn.optimize.stage_settings import StageSettings
 from kop_exudyn.report.kit_drawings import final_states, summary_rows
 
@@ -19,6 +20,7 @@ def finished(shells, tmp_path_factory):
     stages = StageSettings(schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2)
     outcome = run_job(shells, {"linear": 3, "angular": 2}, JobSettings(jobs=1, baselines=False, stages=stages))
     result = KitResult(shells, outcome.references, outcome.stages)
+    result.stages["direct"].jumps.append(Jump(shells[0].name, 0.5, 0.07))
     save_result(folder / "result.json", result.to_dict())
     save_states(folder / "states.npz", final_states(result))
     return result, folder
@@ -52,6 +54,15 @@ def test_all_stages_come_back(finished, shells, monkeypatch):
     for a, b in zip(again.references, result.references):
         assert a.energy == pytest.approx(b.energy, rel=1e-9)
         assert a.equilibria["deployed"].torque == pytest.approx(b.equilibria["deployed"].torque, rel=1e-6)
+
+
+def test_snaps_belong_to_their_stages(finished, shells):
+    result, folder = finished
+    again = load_run(folder, shells)
+    for stage, found in result.stages.items():
+        assert [j.design for j in again.stages[stage].jumps] == [j.design for j in found.jumps]
+    last = again.stages["direct"].jumps[-1]
+    assert (last.design, last.fraction) == (shells[0].name, 0.5) and last.distance == pytest.approx(0.07)
 
 
 def test_strength_is_in_every_stage(finished):
