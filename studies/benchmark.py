@@ -50,7 +50,7 @@ def main() -> None:
     # 1. Full deployments.
     cases = {"C-shell": ("small/03_exp.json", "elements_per_piece"), "grid": CASES["grid"]} if quick else CASES
     rows = [row for case, (file, field) in cases.items() for row in deployments(
-        case, lambda n, f=file, k=field: fresh(MODELS / f, {k: n}), refinements, 4 if quick else FINE, runs)]
+        case, lambda n, f=file, k=field: fresh(read_json(MODELS / f), {k: n}), refinements, 4 if quick else FINE, runs)]
 
     # 2. One solve three ways: from a straight strip, from a design surface, and from a neighbouring equilibrium.
     ways = three_ways("cantilever", lambda n: (*cantilever(n), None), lambda n: [n], refinements, FINE_STRIP, 1.0, runs)
@@ -89,7 +89,7 @@ def main() -> None:
 
 
 def grid(n: int):
-    return fresh(MODELS / CASES["grid"][0], {CASES["grid"][1]: n})
+    return fresh(read_json(MODELS / CASES["grid"][0]), {CASES["grid"][1]: n})
 
 
 def grid_from_its_surface(n: int):
@@ -116,8 +116,10 @@ def promised(runs: int, released: Path, largest: dict, faster: list, quick: bool
     if not quick:
         table.append(goals.large_c_shell(read_json(MODELS / "conformals" / "01_sinh.json"), runs))
         table += goals.starting(MODELS / "small" / "03_exp.json", runs)
+        five = [load_design(path) for path in sorted((MODELS / "conformals").glob("*.json"))[:5]]
+        table.append(goals.kit_problem(five, {"linear": 12, "angular": 5}, 180.0))
         if released.is_dir():
-            table += goals.released(released, runs)
+            table += goals.released({n: load_design(released / f"{n}.json.gz") for n in goals.RELEASED}, runs)
         else:
             print(f"{released} is not there: goals of released meshes left out", file=sys.stderr)
     return table

@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from statistics import median
 from time import process_time
 from typing import Any, Callable, Mapping
@@ -13,7 +12,6 @@ from ..equilibrium.exudyn_model import solve_alone
 from ..equilibrium.newton import NewtonOptions, solve
 from ..equilibrium.system import System
 from ..errors import SimulationFailure
-from ..io.json_files import read_json
 from ..scene.scene import Scene
 from ..scene.state import State
 from ..structures.base import Design, design_from_dict
@@ -52,9 +50,9 @@ def timed(function: Callable[[Any], Any], runs: int, prepare: Callable[[], Any] 
     return Timing(median(times), min(times), max(times), value)
 
 
-def fresh(path: str | Path, changes: Mapping[str, Any]) -> Design:
-    """A design of a file with some fields changed, its workspaces made, nothing kept from earlier deployments."""
-    design = design_from_dict(read_json(path) | dict(changes), str(path))
+def fresh(data: Mapping[str, Any], changes: Mapping[str, Any]) -> Design:
+    """A design as its file has it with some fields changed, its workspaces made, nothing kept from earlier."""
+    design = design_from_dict(dict(data) | dict(changes), str(data.get("name")))
     design.systems
     return design
 

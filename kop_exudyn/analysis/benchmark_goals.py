@@ -6,21 +6,21 @@ import subprocess
 import sys
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Mapping
+from typing import Any, Mapping, Sequence
 
 import numpy as np
 
 from ..equilibrium.newton import solve
 from ..equilibrium.sensitivities import Sensitivities
 from ..equilibrium.system import System
-from ..io.designs import load_design
+from ..optimize.job import JobSettings, run_job
 from ..structures.base import Design, design_from_dict
 from ..structures.umbrella import Umbrella
 from .benchmark import Row, Timing, deployments, timed
 from .benchmark_scenes import gridshell
 
 _ALLOWED_ERROR = 0.1  # %, of a timed full deployment
-_FULL = {"hemisphere_5t": 0.5, "saddle_5t": 0.35, "lilium": 1.5}  # s
+RELEASED = {"hemisphere_5t": 0.5, "saddle_5t": 0.35, "lilium": 1.5}  # s
 _JOINTS, _OPENING_S = 12, 1.2  # a side of the large C-shell
 
 
@@ -39,18 +39,18 @@ def profile(system: System, timing: Timing) -> str:
             f"{timing.value.iterations} iterations")
 
 
-def released(folder: Path, runs: int) -> list[Row]:
-    """Full deployments of released umbrella meshes, with the fewest elements an arm that the error allows."""
+def released(designs: Mapping[str, Design], runs: int) -> list[Row]:
+    """Full deployments of the meshes of RELEASED, with the fewest elements an arm that the error allows."""
     rows = []
-    for name, allowed in _FULL.items():
-        design = load_design(folder / f"{name}.json.gz")
+    for name, allowed in RELEASED.items():
+        design = designs[name]
         found = deployments(name, lambda n, d=design: _with_arms(d, n), (2, 3, 4), 8, 1)
         row = next(row for row in found if row["error %"] <= _ALLOWED_ERROR or row is found[-1])
         arms = row["elements a piece"]
         timing = timed(lambda own: own.deploy(), runs, lambda d=design, n=arms: _with_arms(d, n))
         note = f"{arms} elements an arm, error {row['error %']:.3f} %, {row['iterations']} iterations"
         rows.append(goal(f"full deployment of {name}", allowed, "s", timing.median, note))
-    return rows + [warm_solve(load_design(folder / "hemisphere_5t.json.gz"), runs)]
+    return rows + [warm_solve(designs["hemisphere_5t"], runs)]
 
 
 def _with_arms(design: Umbrella, elements: int) -> Umbrella:
@@ -127,6 +127,20 @@ def full_sensitivities(design: Design, runs: int) -> Row:
     return goal("full sensitivities of a 9 x 9 C-shell", 3.0, "iterations", full.median / one.median,
                 f"{1e3 * full.median:.1f} ms for {full.value.shape[1]} parameters and {full.value.shape[0]} unknowns; "
                 f"an iteration takes {1e3 * one.median:.2f} ms")
+
+
+def kit_problem(designs: Sequence[Design], parts: Mapping[str, int], allowed: float, jobs: int = 2) -> Row:
+    """Wall time of both stages for some designs, from their input states on, in `jobs` processes."""
+    phases: list[tuple[str, float]] = []
+    outcome = run_job(designs, parts, JobSettings(jobs=jobs, baselines=False),
+                      announce=lambda phase: phases.append((phase, perf_counter())))
+    ends = [begin for _, begin in phases[1:]] + [perf_counter()]
+    spent = {phase: end - begin for (phase, begin), end in zip(phases, ends)}
+    steps = " + ".join(f"{outcome.stages[stage].steps}" for stage in ("relaxed", "assigned"))
+    return goal(f"both stages of {len(designs)} designs of {len(designs[0].joints)} joints", allowed, "s",
+                sum(spent.values()) - spent["input designs"],
+                f"{steps} steps, {outcome.equilibria} equilibria of {outcome.newton_iterations} iterations; "
+                + ", ".join(f"{phase} {seconds:.0f} s" for phase, seconds in spent.items()))
 
 
 def starting(design: Path, runs: int) -> list[Row]:
