@@ -5,6 +5,7 @@ import os
 from functools import wraps
 from pathlib import Path
 
+import distributed
 import numpy as np
 import pytest
 
@@ -143,7 +144,6 @@ def test_a_dying_worker_costs_only_its_task(tmp_path):
 
 @pytest.mark.filterwarnings("ignore")
 def test_a_local_cluster_of_two_workers_gives_the_same(tmp_path):
-    distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None,
                                   host="127.0.0.1") as cluster:
         tasks = squares() + CHAIN + [Task("broken", fail, {"x": 3.0})]
@@ -157,7 +157,6 @@ def test_a_local_cluster_of_two_workers_gives_the_same(tmp_path):
 
 @pytest.mark.filterwarnings("ignore")
 def test_a_cluster_that_does_not_answer_is_named(tmp_path, monkeypatch):
-    distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(distributed, "Client", _hurried(distributed.Client))
     with pytest.raises(InputError, match="no Dask scheduler"):
         run_sweep(squares(), SweepStore(tmp_path), scheduler="tcp://127.0.0.1:9")

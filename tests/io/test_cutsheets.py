@@ -2,6 +2,7 @@
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
 
+import ezdxf
 import numpy as np
 import pytest
 
@@ -14,7 +15,6 @@ from kop_exudyn.io.templates import CutOptions, templates
 from kop_exudyn.kit.cluster import cluster
 from kop_exudyn.structures.base import design_from_dict
 
-ezdxf = pytest.importorskip("ezdxf")
 SVG = "{http://www.w3.org/2000/svg}"
 
 

@@ -3,6 +3,7 @@ import csv
 
 import numpy as np
 import pytest
+import trimesh
 
 from kop_exudyn.analysis.kit_result import KitResult
 from kop_exudyn.errors import InputError, SimulationFailure
@@ -12,8 +13,6 @@ from kop_exudyn.io.result_tables import result_tables
 from kop_exudyn.io.tables import csv_text
 from kop_exudyn.optimize.job import JobSettings, run_job
 from kop_exudyn.optimize.stage_settings import StageSettings
-
-trimesh = pytest.importorskip("trimesh")
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +25,6 @@ def result(shells):
 
 
 def test_workshop_folder(parts, tmp_path):
-    pytest.importorskip("ezdxf")
     files = export_workshop(parts, tmp_path / "workshop", "m")
     names = {path.name for path in files}
     assert {"cut_list.csv", "bill_first.csv", "assembly_second.csv", "cut_sheet_1.dxf", "cut_sheet_1.svg",

@@ -1,6 +1,8 @@
 """Solids, lines and fields read back by trimesh and meshio, and measured."""
+import meshio
 import numpy as np
 import pytest
+import trimesh
 
 from kop_exudyn.analysis.strength import design_strength
 from kop_exudyn.errors import InputError
@@ -11,9 +13,6 @@ from kop_exudyn.io.vtk import element_fields, write_vtu
 from kop_exudyn.rods.rotations import rotation_z
 from kop_exudyn.rods.sections import circle, general, rectangle
 from kop_exudyn.scene.builder import SceneBuilder
-
-trimesh = pytest.importorskip("trimesh")
-meshio = pytest.importorskip("meshio")
 
 
 def rod(section, points, frames=None):

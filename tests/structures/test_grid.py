@@ -293,7 +293,6 @@ def test_bad_design_files_are_named_with_their_field(write_json_file, change, fi
 
 
 def test_mesh_files_lie_beside_the_design(write_json_file, tmp_path):
-    pytest.importorskip("trimesh")
     side = np.linspace(-0.6, 0.6, 13)
     x, y = (a.ravel() for a in np.meshgrid(side, side, indexing="ij"))
     k = np.arange(169).reshape(13, 13)

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings, strategies as st
 
 from kop_exudyn.errors import InputError
@@ -132,7 +133,6 @@ def test_rough_meshes_are_refused():
 
 @pytest.mark.parametrize("suffix", [".obj", ".ply", ".stl"])
 def test_mesh_files_give_the_same_surface(tmp_path, suffix):
-    trimesh = pytest.importorskip("trimesh")
     vertices, faces = bumpy_mesh(15)
     trimesh.Trimesh(vertices, faces, process=False).export(tmp_path / f"patch{suffix}")
     loaded = load_mesh_surface(tmp_path / f"patch{suffix}")
@@ -140,7 +140,6 @@ def test_mesh_files_give_the_same_surface(tmp_path, suffix):
 
 
 def test_unreadable_mesh_files_are_named(tmp_path):
-    pytest.importorskip("trimesh")
     (tmp_path / "bad.ply").write_bytes(b"ply\nformat nonsense\n")
     for name, message in (("none.obj", "no such file"), ("bad.ply", "can't be read"), ("a.txt", "no mesh file")):
         with pytest.raises(InputError, match=message):
