@@ -137,21 +137,34 @@ def _backward(first, end, indptr, indices, data, inverse, work, panel):
     below = indptr[end - 1]
     a0, a1, a2, a3, a4, a5 = _offsets(first, end, indptr)
     m = indptr[end] - below
-    for t in range(0, m, 2):
-        # two rows at once, since storing the panel is what takes longest; an odd last one is taken twice, once times 0
-        u, once = (t + 1, 1.0) if t + 1 < m else (t, 0.0)
-        row, next_row = work[indices[below + t]], work[indices[below + u]]
-        v0, v1, v2, v3, v4, v5 = data[a0 + t], data[a1 + t], data[a2 + t], data[a3 + t], data[a4 + t], data[a5 + t]
-        w0, w1, w2 = once * data[a0 + u], once * data[a1 + u], once * data[a2 + u]
-        w3, w4, w5 = once * data[a3 + u], once * data[a4 + u], once * data[a5 + u]
+    for t in range(0, m - m % 4, 4):
+        # four rows at once, since storing the panel is what takes longest
+        w0, w1 = work[indices[below + t]], work[indices[below + t + 1]]
+        w2, w3 = work[indices[below + t + 2]], work[indices[below + t + 3]]
+        v00, v01, v02, v03 = data[a0 + t], data[a0 + t + 1], data[a0 + t + 2], data[a0 + t + 3]
+        v10, v11, v12, v13 = data[a1 + t], data[a1 + t + 1], data[a1 + t + 2], data[a1 + t + 3]
+        v20, v21, v22, v23 = data[a2 + t], data[a2 + t + 1], data[a2 + t + 2], data[a2 + t + 3]
+        v30, v31, v32, v33 = data[a3 + t], data[a3 + t + 1], data[a3 + t + 2], data[a3 + t + 3]
+        v40, v41, v42, v43 = data[a4 + t], data[a4 + t + 1], data[a4 + t + 2], data[a4 + t + 3]
+        v50, v51, v52, v53 = data[a5 + t], data[a5 + t + 1], data[a5 + t + 2], data[a5 + t + 3]
         for c in range(_BLOCK):
-            x, y = row[c], next_row[c]
-            panel[c] -= v0 * x + w0 * y
-            panel[_BLOCK + c] -= v1 * x + w1 * y
-            panel[2 * _BLOCK + c] -= v2 * x + w2 * y
-            panel[3 * _BLOCK + c] -= v3 * x + w3 * y
-            panel[4 * _BLOCK + c] -= v4 * x + w4 * y
-            panel[5 * _BLOCK + c] -= v5 * x + w5 * y
+            r0, r1, r2, r3 = w0[c], w1[c], w2[c], w3[c]
+            panel[c] -= v00 * r0 + v01 * r1 + v02 * r2 + v03 * r3
+            panel[_BLOCK + c] -= v10 * r0 + v11 * r1 + v12 * r2 + v13 * r3
+            panel[2 * _BLOCK + c] -= v20 * r0 + v21 * r1 + v22 * r2 + v23 * r3
+            panel[3 * _BLOCK + c] -= v30 * r0 + v31 * r1 + v32 * r2 + v33 * r3
+            panel[4 * _BLOCK + c] -= v40 * r0 + v41 * r1 + v42 * r2 + v43 * r3
+            panel[5 * _BLOCK + c] -= v50 * r0 + v51 * r1 + v52 * r2 + v53 * r3
+    for t in range(m - m % 4, m):
+        row = work[indices[below + t]]
+        v0, v1, v2, v3, v4, v5 = data[a0 + t], data[a1 + t], data[a2 + t], data[a3 + t], data[a4 + t], data[a5 + t]
+        for c in range(_BLOCK):
+            panel[c] -= v0 * row[c]
+            panel[_BLOCK + c] -= v1 * row[c]
+            panel[2 * _BLOCK + c] -= v2 * row[c]
+            panel[3 * _BLOCK + c] -= v3 * row[c]
+            panel[4 * _BLOCK + c] -= v4 * row[c]
+            panel[5 * _BLOCK + c] -= v5 * row[c]
     for q in range(w - 1, -1, -1):
         own, row = panel[q * _BLOCK: (q + 1) * _BLOCK], work[first + q]
         for p in range(q + 1, w):

@@ -235,10 +235,10 @@ class _Run:
         while True:
             energy = system.assemble(self.state, mixed=True)
             residual, gap = self.residual()
-            if self._converged(residual, gap):
+            merit, value = self._merit(residual, gap), energy.potential + self.torque * gap
+            if merit <= 1.0:
                 self.assembled = energy if self._predicted() else None
                 return True
-            merit, value = self._merit(residual, gap), energy.potential + self.torque * gap
             if np.isfinite(value) and (best is None or self._headway(best, value, merit)):
                 if since <= _QUICK:
                     cap, floor = min(options.rotation_cap, 2 * cap), floor / _FLOOR_FACTOR

@@ -182,9 +182,13 @@ def element_hessian(R0, L, K, p, phi, sigma, A, D, B, KB, X, T, H):
     for r in range(6):
         for k in range(3, 12):
             KB[r, k] = K[r] / L * B[r, k]
-    for i in range(3, 12):
+    for i in range(3):
         for k in range(3, 12):
-            H[i, k] = KB[0, i] * B[0, k] + KB[1, i] * B[1, k] + KB[2, i] * B[2, k]
+            H[3 + i, k] = KB[0, 3 + i] * B[0, k] + KB[1, 3 + i] * B[1, k] + KB[2, 3 + i] * B[2, k]
+        for k in range(6, 12):
+            H[6 + i, k] = KB[0, 6 + i] * B[0, k] + KB[1, 6 + i] * B[1, k] + KB[2, 6 + i] * B[2, k]
+        for k in range(9, 12):
+            H[9 + i, k] = KB[0, 9 + i] * B[0, k] + KB[1, 9 + i] * B[1, k] + KB[2, 9 + i] * B[2, k]
     for i in range(3):
         for k in range(3):
             H[3 + i, 3 + k] += KB[3, 3 + i] * B[3, 3 + k] + KB[4, 3 + i] * B[4, 3 + k] + KB[5, 3 + i] * B[5, 3 + k]
