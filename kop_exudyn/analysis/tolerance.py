@@ -17,6 +17,9 @@ from ..kit.kinds import part_kind
 from ..optimize.fitting import best_placement
 from ..optimize.objective import DesignObjective, Evaluation
 from ..structures.base import Design
+from .buckling import snapped
+
+_STEPS_BACK = 3  # to the planned elements, which are near
 
 
 @dataclass(frozen=True)
@@ -70,12 +73,16 @@ class Spread:
 
 @dataclass(frozen=True)
 class Sample:
-    """One set of errors, and what came of it: the joints' displacements (n, 3), or why no equilibrium was found."""
+    """One set of errors, and what came of it: the joints' displacements (n, 3), or why no equilibrium was found.
+
+    snapped : into another state, from which the design doesn't come back when the errors are taken away
+    """
 
     errors: np.ndarray
     displacements: np.ndarray | None
     max_percent: float | None
     failed: str | None = None
+    snapped: bool = False
 
 
 def joint_jacobian(design: Design, evaluation: Evaluation) -> np.ndarray:
@@ -126,7 +133,8 @@ def sample_spread(design: Design, evaluation: Evaluation, tolerance: Tolerance, 
             continue
         joints = found.equilibria[role].state.positions[design.joints]
         moved = best_placement(joints, wanted, np.full(len(joints), 1 / len(joints))).apply(joints) - wanted
-        samples.append(Sample(errors, moved, found.fit.max_percent))
+        samples.append(Sample(errors, moved, found.fit.max_percent,
+                              snapped=snapped(objective, found, evaluation, _STEPS_BACK)))
     return samples
 
 
@@ -164,8 +172,9 @@ def robustness(design: Design, evaluation: Evaluation, tolerance: Tolerance, fac
     """What errors of several sizes do to a design, by sensitivities and by sampling; plain data.
 
     factors : multiples of the tolerance; number : samples for each
-    Of each size: root mean square and worst joint's displacement, predicted and sampled; `linear_error`, the part of
-    the sampled displacements that their own prediction misses; the fit's largest deviations; how many samples failed.
+    Of each size: root mean square and worst joint's displacement, predicted and sampled; the fit's largest deviations;
+    how many samples failed, and how many snapped; `linear_error`, the part of the displacements that their own
+    prediction misses, of the samples that kept to the state.
     """
     sizes = []
     for factor in factors:
@@ -174,16 +183,20 @@ def robustness(design: Design, evaluation: Evaluation, tolerance: Tolerance, fac
         samples = sample_spread(design, evaluation, scaled, number, seed)
         found = [sample for sample in samples if sample.displacements is not None]
         entry = {"factor": factor, "predicted_rms_percent": predicted.rms_percent,
-                 "predicted_worst_percent": predicted.worst_percent, "samples": number, "failed": number - len(found)}
+                 "predicted_worst_percent": predicted.worst_percent, "samples": number, "failed": number - len(found),
+                 "snapped": sum(sample.snapped for sample in found)}
         if found:
             sampled = sampled_spread(samples, evaluation.fit.diagonal)
-            moved = np.stack([sample.displacements for sample in found])
-            missed = np.linalg.norm(moved - predicted_displacements(design, evaluation, found))
             entry |= {"sampled_rms_percent": sampled.rms_percent, "sampled_worst_percent": sampled.worst_percent,
-                      "linear_error": float(missed / np.linalg.norm(moved)),
                       "max_percent": [sample.max_percent for sample in found]}
+        kept = [sample for sample in found if not sample.snapped]
+        if kept:
+            moved = np.stack([sample.displacements for sample in kept])
+            missed = np.linalg.norm(moved - predicted_displacements(design, evaluation, kept))
+            entry["linear_error"] = float(missed / np.linalg.norm(moved))
         sizes.append(entry)
     return {"design": design.name, "elements": design.n_elements, "length": tolerance.length, "angle": tolerance.angle,
-            "planned_max_percent": evaluation.fit.max_percent, "shares": dict(shares_by_kind(design, evaluation, tolerance)),
+            "planned_max_percent": evaluation.fit.max_percent,
+            "shares": dict(shares_by_kind(design, evaluation, tolerance)),
             "joints_percent": 100 * predicted_spread(design, evaluation, tolerance).joints / evaluation.fit.diagonal,
             "sizes": sizes}

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
+from ..analysis.buckling import buckled
 from ..analysis.kit_result import STAGES, KitResult
 from .style import INK, PALETTE, QUIET, style
 
@@ -15,12 +16,12 @@ Row = Mapping[str, Any]
 
 _COLOURS = {"direct": PALETTE["vermillion"], "unrelaxed": PALETTE["orange"], "relaxed": PALETTE["sky"],
             "assigned": PALETTE["blue"]}
-_RING, _SNAPPED = 110, {"marker": "o", "facecolors": "none", "edgecolors": INK, "linewidths": 1.2}
+_RING, _AROUND = 110, {"marker": "o", "facecolors": "none", "edgecolors": INK, "linewidths": 1.2}
 _MARKERS = {"direct": "s", "unrelaxed": "^", "relaxed": "D", "assigned": "o"}
 
 
 def comparison_rows(class_name: str, result: KitResult) -> list[dict[str, Any]]:
-    """One row a design: largest and mean deviations after every stage, energies, which stages snapped and failed."""
+    """One row a design: largest and mean deviations after every stage, energies, where it buckled or failed."""
     rows = []
     for n, design in enumerate(result.designs):
         found = {stage: result.summary(stage, n) for stage in STAGES if stage in result.stages}
@@ -28,8 +29,8 @@ def comparison_rows(class_name: str, result: KitResult) -> list[dict[str, Any]]:
         row |= {f"{stage} max %": _fit(found.get(stage), "max_percent") for stage in STAGES}
         row |= {f"{stage} mean %": _fit(found.get(stage), "mean_percent") for stage in ("direct", "assigned")}
         row |= {f"{stage} energy": found.get(stage, {}).get("energy_ratio") for stage in STAGES}
-        row["snapped"] = ", ".join(f"{stage} ({100 * jump.distance:.0f} %)" for stage in found
-                                   for jump in result.stages[stage].jumps if jump.design == design.name) or "–"
+        row["buckled"] = ", ".join(stage for stage in found if buckled(
+            design, result.stages[stage].designs[n], result.references[n])) or "–"
         row["no equilibrium"] = ", ".join(stage for stage, summary in found.items() if "failed" in summary) or "–"
         rows.append(row)
     return rows
@@ -42,9 +43,8 @@ def finding(rows: Sequence[Row]) -> str:
                  f"(direct) and {np.median(unrelaxed):.2g} % (unrelaxed) to {np.median(assigned):.2g} % (assigned); "
                  f"the worst design ends at {max(assigned):.2g} %, after direct projection it is {max(direct):.2g} % "
                  "off."]
-    snapped = [row["design"] for row in rows if row["snapped"].startswith("direct")]
-    sentences.append(f"On the way from the inputs to their nearest parts {len(snapped)} designs snap"
-                     + (f" ({', '.join(snapped)})." if snapped else "."))
+    away = [f"{row['design']} ({row['buckled']})" for row in rows if row["buckled"] != "–"]
+    sentences.append(f"Buckled into other states: {', '.join(away)}." if away else "None has buckled.")
     failed = [f"{row['design']} ({row['no equilibrium']})" for row in rows if row["no equilibrium"] != "–"]
     if failed:
         sentences.append(f"No equilibrium was found for {', '.join(failed)}.")
@@ -52,7 +52,7 @@ def finding(rows: Sequence[Row]) -> str:
 
 
 def draw_comparison(rows: Sequence[Row]) -> Figure:
-    """Every design a line, its stages markers on a logarithmic axis of the largest deviation; rings: it snapped."""
+    """Every design a line, its stages markers on a logarithmic axis of the largest deviation; rings: buckled."""
     stages = [stage for stage in STAGES if any(row[f"{stage} max %"] is not None for row in rows)]
     values = [row[f"{stage} max %"] for row in rows for stage in stages if row[f"{stage} max %"]]
     low, high = 0.6 * min(values), 2.0 * max(values)
@@ -69,7 +69,7 @@ def draw_comparison(rows: Sequence[Row]) -> Figure:
         _mark_classes(ax, rows, low)
         for stage in stages:
             ax.scatter([], [], color=_COLOURS[stage], marker=_MARKERS[stage], s=34, label=stage)
-        ax.scatter([], [], s=_RING, label="snapped on the way", **_SNAPPED)
+        ax.scatter([], [], s=_RING, label="buckled", **_AROUND)
         figure.legend(loc="outside lower center", ncols=len(stages) + 1)
     return figure
 
@@ -83,8 +83,8 @@ def _draw_row(ax: Axes, y: int, row: Row, stages: Sequence[str], failed_at: floa
         missing = value is None
         x = failed_at if missing else value
         ax.scatter(x, y, color=_COLOURS[stage], marker="x" if missing else _MARKERS[stage], s=34, zorder=3)
-        if f"{stage} (" in row["snapped"]:
-            ax.scatter(x, y, s=_RING, zorder=4, **_SNAPPED)
+        if stage in row["buckled"].split(", "):
+            ax.scatter(x, y, s=_RING, zorder=4, **_AROUND)
 
 
 def _mark_classes(ax: Axes, rows: Sequence[Row], low: float) -> None:

@@ -57,11 +57,16 @@ class _View:
     far: float
 
 
-def draw_designs(designs: Sequence[DrawnDesign], limit_percent: float | None = None) -> Figure:
+def draw_designs(designs: Sequence[DrawnDesign], limit_percent: float | None = None,
+                 quantity: str = "deviation") -> Figure:
     """One row a design, one column a state, each row in its own scale; one scale of colours for all.
 
+    The states' titles stand above the columns, or in each panel where the rows have different ones.
+
     limit_percent : deviation of the darkest colour; default: the largest one that is drawn
+    quantity : what the colours tell
     """
+    alike = len({tuple(state.title for state in design.states) for design in designs}) == 1
     columns = max(len(design.states) for design in designs)
     views = [_view([*design.wanted, *(chain for state in design.states for chain in state.chains)])
              for design in designs]
@@ -79,11 +84,13 @@ def draw_designs(designs: Sequence[DrawnDesign], limit_percent: float | None = N
             for column, state in enumerate(design.states):
                 ax = figure.add_subplot(grid[row, column])
                 _draw_state(ax, state, design.wanted, view, norm)
-                if row == 0:
+                if not alike:
+                    ax.text(0.5, 0.985, state.title, transform=ax.transAxes, ha="center", va="top")
+                elif row == 0:
                     ax.set_title(state.title, loc="center", pad=4)
                 if column == 0:
                     ax.text(0.0, 0.985, design.name, transform=ax.transAxes, va="top", weight="bold")
-        _colour_bar(figure, norm, beyond=limit_percent is not None and largest > limit_percent)
+        _colour_bar(figure, norm, quantity, beyond=limit_percent is not None and largest > limit_percent)
     return figure
 
 
@@ -138,10 +145,10 @@ def _draw_rods(ax: Axes, chains: Sequence[np.ndarray], view: _View) -> None:
                                      capstyle="round", zorder=2))
 
 
-def _colour_bar(figure: Figure, norm: Normalize, beyond: bool) -> None:
+def _colour_bar(figure: Figure, norm: Normalize, quantity: str, beyond: bool) -> None:
     width, height = figure.get_figwidth(), figure.get_figheight()
     length = min(2.4, 0.7 * height)
     place = figure.add_axes((1 - 0.8 / width, 0.5 - 0.5 * length / height, 0.12 / width, length / height))
     bar = figure.colorbar(ScalarMappable(norm, deviation_colours()), cax=place, extend="max" if beyond else "neither")
-    bar.set_label("deviation, % of box diagonal")
+    bar.set_label(f"{quantity}, % of box diagonal")
     bar.outline.set_visible(False)

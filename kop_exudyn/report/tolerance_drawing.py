@@ -6,7 +6,7 @@ from typing import Any, Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator
 
 from ..analysis.tolerance import relative_tolerance, robustness
 from ..errors import SimulationFailure
@@ -38,7 +38,10 @@ def robustness_of_run(run: Path, models: str, number: int | None, share: float, 
 
 
 def draw_agreement(classes: Mapping[str, Sequence[Found]]) -> Figure:
-    """Displacement against the size of errors, and what the prediction misses of it; one column a class."""
+    """Displacement against the size of errors, and what the prediction misses of it; one column a class.
+
+    Hollow markers: some of the samples snapped.
+    """
     with style():
         figure = Figure(figsize=(3.3 * len(classes) + 0.4, 6.2), layout="constrained")
         panels = figure.subplots(2, len(classes), sharey="row", sharex=True, squeeze=False)
@@ -52,6 +55,7 @@ def draw_agreement(classes: Mapping[str, Sequence[Found]]) -> Figure:
             for ax in (top, bottom):
                 ax.set(xscale="log", yscale="log")
                 ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+                ax.xaxis.set_major_locator(LogLocator(numticks=9))
                 ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         panels[0, 0].set_ylabel("rms displacement of the joints,\n% of the box diagonal")
         panels[1, 0].set_ylabel("missed by the prediction,\nshare of the displacement")
@@ -62,12 +66,14 @@ def _draw_design(top, bottom, found: Found, colour: str, marker: str) -> None:
     sizes = found["sizes"]
     factors = [size["factor"] for size in sizes]
     top.plot(factors, [size["predicted_rms_percent"] for size in sizes], color=colour, linewidth=1.2)
-    solved = [size for size in sizes if "linear_error" in size]
-    xs = [size["factor"] for size in solved]
-    top.plot(xs, [size["sampled_rms_percent"] for size in solved], color=colour, marker=marker, linestyle="none",
-             markersize=4.5, label=found["design"])
-    bottom.plot(xs, [size["linear_error"] for size in solved], color=colour, marker=marker, markersize=4.5,
-                linewidth=1.2)
+    for size in sizes:
+        if "sampled_rms_percent" in size:
+            top.plot(size["factor"], size["sampled_rms_percent"], color=colour, marker=marker, markersize=4.5,
+                     markerfacecolor="white" if size["snapped"] else colour)
+    top.plot([], [], color=colour, marker=marker, markersize=4.5, linewidth=1.2, label=found["design"])
+    kept = [size for size in sizes if "linear_error" in size]
+    bottom.plot([size["factor"] for size in kept], [size["linear_error"] for size in kept], color=colour, marker=marker,
+                markersize=4.5, linewidth=1.2)
 
 
 def table_rows(classes: Mapping[str, Sequence[Found]]) -> list[dict[str, Any]]:
@@ -85,16 +91,17 @@ def table_rows(classes: Mapping[str, Sequence[Found]]) -> list[dict[str, Any]]:
                 "by lengths, %": 100 * sum(s for kind, s in found["shares"].items() if kind != "angular"),
                 "planned max %": found["planned_max_percent"],
                 "95 % of builds below, max %": float(np.quantile(deviations, 0.95)) if deviations else None,
+                "snapped": f"{size['snapped']} of {size['samples']}",
                 "no equilibrium": f"{size['failed']} of {size['samples']}"})
     return rows
 
 
 def drawn_spreads(classes: Mapping[str, Sequence[Found]], number: int = 3) -> list[DrawnDesign]:
-    """The designs of each class, coloured by how far each joint is displaced; the first `number` of each."""
+    """A row a class: the `number` designs whose joints are displaced most, coloured by how far each joint is."""
     drawn = []
     for name, designs in classes.items():
-        states = [DrawnState(found["design"], [np.array(chain) for chain in found["chains"]],
-                             np.array(found["joints"]), np.array(found["joints_percent"]))
-                  for found in designs[:number]]
-        drawn += [DrawnDesign(f"{name}: {state.title}", [state]) for state in states]
+        most = sorted(designs, key=lambda found: -np.linalg.norm(found["joints_percent"]))[:number]
+        drawn.append(DrawnDesign(name, [
+            DrawnState(found["design"], [np.array(chain) for chain in found["chains"]], np.array(found["joints"]),
+                       np.array(found["joints_percent"])) for found in most]))
     return drawn
