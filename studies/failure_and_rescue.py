@@ -41,8 +41,8 @@ def main() -> None:
     rescued = [min(group, key=lambda case: case["at the parts %"]) for group in (heavier, larger) if group]
     shown = [failed, *rescued]
     finding = (f"{len(snapped)} of {len(cases)} cases snap on the way to their parts. With {label_text(failed)} a "
-               f"joint jumps {failed['snap %']:.0f} % of the box at {failed['snap at']:.0%} of the way, and the design ends "
-               f"{failed['at the parts %']:.1f} % off; "
+               f"joint jumps {failed['snap %']:.0f} % of the box at {failed['snap at']:.0%} of the way, and the design "
+               f"ends {failed['at the parts %']:.1f} % off; "
                + " and ".join(f"with {label_text(case)} it stays in its state and ends "
                               f"{case['at the parts %']:.1f} % off" for case in rescued) + ".")
     report = study.report(finding)
@@ -57,8 +57,8 @@ def main() -> None:
                   alt="The design relaxed, after its snap, and rescued")
     report.section("All cases")
     report.figure("map", draw_map(cases), "Largest deviation of the joints at the parts, % of the box, before these "
-                  "are tuned. Framed: a snap, and how far the joint jumped. Far off without a frame: the design got there "
-                  "in several steps, none of which stands out, so the watch on the path alone doesn't tell.",
+                  "are tuned. Framed: a snap, and how far the joint jumped. Far off without a frame: the design got "
+                  "there in several steps, none of which stands out, so the watch on the path alone doesn't tell.",
                   alt="Deviation for all kits and weights")
     fields = ("relaxed %", "at the parts %", "snap at", "snap %")
     rows = [{"linear": case["parts"]["linear"], "angular": case["parts"]["angular"], "w_c": case["weight"],

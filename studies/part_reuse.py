@@ -48,9 +48,9 @@ def main() -> None:
     most, least = max(pairs), min(pairs)
     shared = int(np.count_nonzero(part_users(counts) == len(names)))
     finding = (f"Of the {len(labels)} parts of the kit with {size} linear ones, {shared} are used by all {len(names)} "
-               f"designs; {most[1]} and {most[2]} share most ({most[0]:.0%} of their pieces), {least[1]} and {least[2]} "
-               f"least ({least[0]:.0%}). From {rows[0]['linear']} to {rows[-1]['linear']} linear parts the average reuse "
-               f"goes from {rows[0]['average reuse']:.2f} to {rows[-1]['average reuse']:.2f}.")
+               f"designs; {most[1]} and {most[2]} share most ({most[0]:.0%} of their pieces), {least[1]} and "
+               f"{least[2]} least ({least[0]:.0%}). From {rows[0]['linear']} to {rows[-1]['linear']} linear parts the "
+               f"average reuse goes from {rows[0]['average reuse']:.2f} to {rows[-1]['average reuse']:.2f}.")
 
     # 3. The report.
     report = study.report(finding)

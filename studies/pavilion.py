@@ -2,11 +2,12 @@
 
     python studies/pavilion.py [--quick] [--out reports/pavilion] [--jobs 2]
 
-The kits of the study `direct_vs_relaxed` as architecture: one design of each class, enlarged until a person can stand
-beneath it; two are lifted on four masts each, which belong to the picture only. Every rod is the equilibrium shape
-that Exudyn confirmed, swept with its true section, and has the colour of the part that it is cut as. Without weight,
-a structure that is enlarged together with its sections keeps its shape; what self-weight adds is not shown. The
-pictures are rendered by the package itself, with depth buffers for the eye and for eighty lights of sun and sky.
+The kits of the study of direct and relaxed kits as architecture: one design of each class, enlarged until a person
+can stand beneath it; two are lifted on four masts each, which belong to the picture only. Every rod is the
+equilibrium shape that Exudyn confirmed, swept with its true section, and has the colour of the part that it is cut
+as. Without weight, a structure that is enlarged together with its sections keeps its shape; what self-weight adds is
+not shown. The pictures are rendered by the package itself, with depth buffers for the eye and for eighty lights of
+sun and sky.
 """
 from __future__ import annotations
 
@@ -36,8 +37,8 @@ def main() -> None:
 
     # 2. Their pictures.
     rows = [{"class": name, "design": p.name, "elements": p.elements, "different parts": p.parts,
-             "plan, m": f"{p.footprint[0]:.1f} x {p.footprint[1]:.1f}", "height, m": p.height, "enlarged": p.scale,
-             "max deviation %": p.max_percent} for name, p in chosen.items()]
+             "plan, m": f"{p.footprint[0]:.1f} x {p.footprint[1]:.1f}", "height, m": p.height,
+             "m per model unit": p.scale, "max deviation %": p.max_percent} for name, p in chosen.items()]
     finding = "; ".join(f"{p.name} ({name}): {p.elements} elements of {p.parts} different parts span "
                         f"{max(p.footprint):.0f} m within {p.max_percent:.2g} % of the shape"
                         for name, p in chosen.items()) + "."

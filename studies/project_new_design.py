@@ -54,8 +54,8 @@ def main() -> None:
         finding = (f"{design.name} deviates by {shown(direct)} when its elements become their nearest parts, by "
                    f"{shown(best['built max %'])} when they are relaxed before (w_c = {best['w_c']:.3g} times the "
                    f"weight of the fit), and by {shown(best['reassigned max %'])} after exchanges; "
-                   f"{best['reassigned changes']} of its {design.n_elements} elements then have other parts than in the "
-                   "direct projection.")
+                   f"{best['reassigned changes']} of its {design.n_elements} elements then have other parts than "
+                   "in the direct projection.")
 
     # 3. The report.
     report = study.report(finding)

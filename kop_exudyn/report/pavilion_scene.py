@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib import rcParams
 from matplotlib.figure import Figure
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, cKDTree
 
 from ..analysis.kit_result import KitResult
 from ..errors import SimulationFailure
@@ -69,7 +69,9 @@ def pavilion(result: KitResult, number: int, span: float, clearance: float = 0.0
     base = np.array([*(0.5 * (low + high)[:2]), low[2] - clearance / scale])
     rods, joints = scale * (rods - base), scale * (joints - base)
     breadth = scale * _breadth(scene, plain)
-    bodies = [Body(rods, mesh.faces, colours[mesh.chains[mesh.faces[:, 0]]]), _balls(joints, 0.62 * breadth)]
+    on_rods = cKDTree(rods).query(joints)[0] < breadth  # joints of umbrellas are their cells' centres
+    bodies = [Body(rods, mesh.faces, colours[mesh.chains[mesh.faces[:, 0]]])]
+    bodies += [_balls(joints[on_rods], 0.62 * breadth)] if on_rods.any() else []
     bodies += _masts(joints) if clearance else []
     return Pavilion(design.name, bodies, np.ptp(rods[:, :2], axis=0), float(rods[:, 2].max()), float(scale),
                     design.n_elements, len({(piece.kind, piece.part) for piece in pieces.pieces}),

@@ -151,15 +151,20 @@ class StudyReport:
     def figure(self, name: str, figure: Figure, caption: str, *, alt: str, colours: int | None = 256) -> StudyReport:
         """A figure, in the page as pixels, beside it as NAME.pdf and, unless it is too large for that, NAME.svg.
 
-        colours : of the pixels; None: all, for renderings
+        colours : of the pixels; None: all, for renderings, which are in the page only
         """
+        pixels = figure_bytes(figure, "png")
+        if colours is not None:
+            self._drawing(name, figure)
+            pixels = with_palette(pixels, colours)
+        self.page.figure(pixels, caption, alt=alt, suffix="png")
+        return self
+
+    def _drawing(self, name: str, figure: Figure) -> None:
         save_figure(figure, self.study.out / name, ("pdf",), overwrite=True)
         drawing = figure_bytes(figure, "svg")
         if len(drawing) <= _LARGEST_SVG:
             write_bytes(self.study.out / f"{name}.svg", drawing, overwrite=True)
-        pixels = figure_bytes(figure, "png")
-        self.page.figure(pixels if colours is None else with_palette(pixels, colours), caption, alt=alt, suffix="png")
-        return self
 
     def table(self, name: str, rows: Sequence[Mapping[str, Any]], caption: str = "") -> StudyReport:
         """A table of rows with the same keys, beside the page as NAME.csv."""
@@ -191,7 +196,7 @@ class StudyReport:
         kits = (f" Its {len(study.kits_s)} kits took {sum(study.kits_s.values()):.0f} s, once for all studies that "
                 "look at them.") if study.kits_s else ""
         return (f"{setting}, {times['wall_s']:.0f} s of wall time on {environment()['cores']} cores{sweep}{reused}."
-                f"{kits} The figures are beside this page as PDF files, the smaller ones as SVG too, its numbers in "
+                f"{kits} Drawings are beside this page as PDF files, the smaller ones as SVG too, its numbers in "
                 "data.json and CSV files.")
 
 
