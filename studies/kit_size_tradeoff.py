@@ -49,7 +49,9 @@ def main() -> None:
                                        f"and {rows[at]['kit size %']:.0f} %.")
     report = study.report(finding)
     report.figure("tradeoff", draw_tradeoff(rows, "linear", at), "Figures of every kit against its number of linear "
-                  "parts; the dotted line marks the knee.", alt="deviation, kit size, energy, time over linear parts")
+                  "parts; the dotted line marks the knee. Every kit is a local optimum, so one of more parts may be "
+                  "worse: grey is what at most so many parts give.",
+                  alt="deviation, kit size, energy, time over linear parts")
     report.table("kits", rows, "max and mean: of the joints' deviations; energy ratio: mean over the designs; J: the "
                  "objective; a dash: not all designs could be built.")
     designs = [{"linear": task.settings["parts"]["linear"], "design": design["name"], "failed": design.get("failed"),

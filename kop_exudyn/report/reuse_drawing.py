@@ -8,9 +8,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from .style import INK, PALETTE, QUIET, style
+from .tradeoff_drawing import whole_numbers
 
 _MAP = "Blues"  # ordered by brightness, for all kinds of sight
 
@@ -74,7 +74,7 @@ def draw_reuse_over_size(rows: Sequence[Mapping[str, Any]], kind: str) -> Figure
         right.set(title="Kit size", ylabel="pieces, % of all elements", ylim=(0, 105))
         for ax in (left, right):
             ax.set_xlabel(f"{kind} parts")
-            ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+            whole_numbers(ax, sizes)
     return figure
 
 

@@ -8,9 +8,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from .style import FAINT, INK, PALETTE, style
+from .tradeoff_drawing import whole_numbers
 
 _FORMS = ("o", "s", "^", "D", "v", "P", "X")
 
@@ -36,8 +37,7 @@ def draw_slits(rows: Sequence[Mapping[str, Any]]) -> Figure:
                  ylabel="largest deviation, % of box", yscale="log")
         for ax in (energy, slit, fit):
             ax.set_xlabel("linear parts")
-            ax.xaxis.set_major_locator(MultipleLocator(5) if max(row["parts"] for row in rows) > 10
-                                       else MaxNLocator(integer=True))
+            whole_numbers(ax, [row["parts"] for row in rows])
         for ax in (fit, gain):
             _plain(ax)
         figure.legend(*energy.get_legend_handles_labels(), loc="outside lower center", ncols=min(len(costs), 5),
