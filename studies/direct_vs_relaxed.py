@@ -39,7 +39,7 @@ def main() -> None:
                   "state: led back to the elements of the input, it doesn't come back to the input's shape.",
                   alt="Deviation of all designs after the four stages")
     report.table("designs", [{key: row[key] for key in row if not key.endswith("energy")} for row in rows],
-                 "Deviations of the joints in % of the bounding-box diagonal. A dash under a stage: no equilibrium.")
+                 "Deviations of the joints in % of the bounding-box diagonal. Failed: no equilibrium was found.")
     report.table("energies", [{key: row[key] for key in row if key in ("class", "design") or key.endswith("energy")}
                               for row in rows], "Elastic energy of the deployed state, relative to the input's.")
 

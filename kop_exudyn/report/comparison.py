@@ -31,7 +31,7 @@ def comparison_rows(class_name: str, result: KitResult) -> list[dict[str, Any]]:
         row |= {f"{stage} energy": found.get(stage, {}).get("energy_ratio") for stage in STAGES}
         row["buckled"] = ", ".join(stage for stage in found if buckled(
             design, result.stages[stage].designs[n], result.references[n])) or "–"
-        row["no equilibrium"] = ", ".join(stage for stage, summary in found.items() if "failed" in summary) or "–"
+        row["failed"] = ", ".join(stage for stage, summary in found.items() if "failed" in summary) or "–"
         rows.append(row)
     return rows
 
@@ -45,7 +45,7 @@ def finding(rows: Sequence[Row]) -> str:
                  "off."]
     away = [f"{row['design']} ({row['buckled']})" for row in rows if row["buckled"] != "–"]
     sentences.append(f"Buckled into other states: {', '.join(away)}." if away else "None has buckled.")
-    failed = [f"{row['design']} ({row['no equilibrium']})" for row in rows if row["no equilibrium"] != "–"]
+    failed = [f"{row['design']} ({row['failed']})" for row in rows if row["failed"] != "–"]
     if failed:
         sentences.append(f"No equilibrium was found for {', '.join(failed)}.")
     return " ".join(sentences)
