@@ -52,7 +52,7 @@ def main() -> None:
     if built:
         best = min(built, key=lambda row: row["reassigned J"])
         finding = (f"{design.name} deviates by {shown(direct)} when its elements become their nearest parts, by "
-                   f"{shown(best['built max %'])} when they are relaxed before (w_c = {best['w_c']:.3g} times the "
+                   f"{shown(best['built max %'])} when they are relaxed before (w_c = {best['w_c']:g} times the "
                    f"weight of the fit), and by {shown(best['reassigned max %'])} after exchanges; "
                    f"{best['reassigned changes']} of its {design.n_elements} elements then have other parts than "
                    "in the direct projection.")
@@ -62,13 +62,16 @@ def main() -> None:
     report.figure("sweep", draw_projection(rows), "The new design against w_c. Dotted: direct projection.",
                   alt="Deviation, energy, distance to the parts and changed elements over w_c")
     drawn = [tasks[k] for k in np.unique(np.linspace(0, len(tasks) - 1, 6).round().astype(int))]
-    states = [(f"w_c = {task.settings['factor']:.3g}", found[task.name]["reassigned"]) for task in drawn
+    states = [(f"w_c = {task.settings['factor']:g}", found[task.name]["reassigned"]) for task in drawn
               if "failed" not in found[task.name]]
     report.figure("changes", draw_changes(design, states), "The design built of the kit, after exchanges: elements "
                   "with other parts than after direct projection.",
                   alt="The design for several w_c, changed elements in colour")
-    report.table("weights", rows, "w_c over the weight of the fit; deviations in % of the bounding box; a dash: no "
-                 "equilibrium was found.")
+    columns = [f"{state} {what}" for state in STATES[1:] for what in ("max %", "J", "changes")]
+    report.table("weights", [{"w_c": row["w_c"], **{name.replace("reassigned", "exchanged"): row[name]
+                                                    for name in columns}} for row in rows],
+                 f"w_c over the weight of the fit; max %: largest deviation, {shown(direct)} after direct projection; J: "
+                 "the objective; changes: elements with other parts than then. A dash: no equilibrium was found.")
     report.save({"finding": finding, "weights": rows, "design": design.name})
 
 
