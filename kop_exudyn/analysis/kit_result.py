@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import SimulationFailure
 from ..kit.parts import Assignment, Kit
+from ..optimize.events import events_to_list
 from ..optimize.fitting import TargetFitting
 from ..optimize.objective import Evaluation, Reference
 from ..optimize.stage_results import SAME_STATE, StageEvent, StageResult, distance
@@ -15,6 +16,7 @@ from ..structures.base import Design
 from .strength import strength_summary
 
 INPUT = "input"  # the designs as given, before all stages
+REDEPLOYED = "redeployed"  # the assigned designs, opened from their assembly
 STAGES = ("direct", "unrelaxed", "relaxed", "assigned")
 
 
@@ -99,6 +101,7 @@ class KitResult:
             "status": {stage: result.status for stage, result in self.stages.items() if result.status},
             "equilibria": self.equilibria, "newton_iterations": self.newton_iterations,
             "wall_s": self.wall_s, "peak_memory_mb": self.peak_memory_mb, "settings": dict(self.settings),
+            "history": events_to_list(self.events),
         }
 
 

@@ -26,7 +26,8 @@ def check_envelope(data: Any, name: str, version: int, source: Any = None) -> No
                          value=data.get("format", "(missing)"))
     given = data.get("version")
     if isinstance(given, bool) or not isinstance(given, int) or given < 1:
-        raise InputError(f"expected the format's version, 1 to {version}", source=source, field="version",
+        known = "1" if version == 1 else f"1 to {version}"
+        raise InputError(f"unknown version; this kop_exudyn reads {known}", source=source, field="version",
                          value="(missing)" if given is None else given)
     if given > version:
         raise InputError(f"written for a newer kop_exudyn; this one reads versions up to {version}: upgrade with "

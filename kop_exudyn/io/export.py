@@ -78,7 +78,7 @@ def export_desk(result: KitResult, folder: str | Path, *, stage: str = "assigned
                 done += _write_state(parts, PlacedPieces.of(placed, role), equilibrium, path, formats, overwrite)
     if "csv" in formats:
         done += [write_csv(folder / f"{name}.csv", rows, overwrite=overwrite)
-                 for name, rows in result_tables(result).items()]
+                 for name, rows in result_tables(result).items() if rows]
     return done
 
 

@@ -6,12 +6,13 @@ from typing import Any, Mapping, Sequence
 
 import numpy as np
 
-from ..analysis.kit_result import INPUT, STAGES, KitResult
+from ..analysis.kit_result import INPUT, REDEPLOYED, STAGES, KitResult
 from ..equilibrium.newton import Equilibrium, Start, solve
 from ..errors import InputError, SimulationFailure
 from ..kit.parts import Assignment, Kit
+from ..optimize.events import events_from_list
 from ..optimize.objective import DesignObjective, Evaluation, Reference, reference_of
-from ..optimize.stage_results import Jump, StageResult
+from ..optimize.stage_results import Jump, StageEvent, StageResult
 from ..scene.state import State
 from ..structures.base import Design, Role
 from .results import load_result, load_states
@@ -26,7 +27,7 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
     designs : those of the run, in any order; there may be others among them
     Saved states are checked by a solve that starts from them, and confirmed by Exudyn. Folders of earlier versions have
     neither the input designs' states, which are then simulated again, nor the parameters of stages before the last one,
-    which are then left out.
+    which are then left out; nor the states that the assigned designs open into, nor the history.
 
     Raises InputError when the files are damaged or belong to other designs, SimulationFailure when an input design
     can't be simulated.
@@ -44,21 +45,34 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
     objectives = [DesignObjective(design, reference=reference) for design, reference in zip(designs, references)]
     result = KitResult(list(designs), references, {}, settings=data["settings"], equilibria=data["equilibria"],
                        newton_iterations=data["newton_iterations"], wall_s=data["wall_s"],
-                       peak_memory_mb=data["peak_memory_mb"])
+                       peak_memory_mb=data["peak_memory_mb"], events=_history(data, path))
     for stage in STAGES:
         outcomes = [_outcome(objective, stage, states, entry, q if stage == _LAST else None)
                     for objective, entry, q in zip(objectives, data["designs"], realised)]
         if None not in outcomes:
             result.stages[stage] = StageResult(outcomes, kit, assignment, data["steps"].get(stage, 0),
-                                               data["objective"].get(stage), data["status"].get(stage, ""),
+                                               data.get("objective", {}).get(stage),
+                                               data.get("status", {}).get(stage, ""),
                                                _jumps(data, stage))
+    opened = [_opened(objective, states, entry, q)
+              for objective, entry, q in zip(objectives, data["designs"], realised)]
+    if None not in opened:
+        result.redeployed = opened
     return result
+
+
+def _history(data: Mapping[str, Any], path: Path) -> list[StageEvent]:
+    """The accepted steps; none in files of earlier versions."""
+    try:
+        return events_from_list(data.get("history", []))
+    except InputError as error:
+        raise error.at(path) from None
 
 
 def _jumps(data: Mapping[str, Any], stage: str) -> list[Jump]:
     """The snaps before a stage; files of earlier versions don't tell of which stage theirs are."""
     return [Jump(jump["design"], jump["fraction"], jump["distance_percent"] / 100)
-            for jump in data["jumps"] if jump.get("stage") == stage]
+            for jump in data.get("jumps", []) if jump.get("stage") == stage]
 
 
 def _named(designs: Sequence[Design], names: Sequence[str], path: Path) -> list[Design]:
@@ -73,10 +87,25 @@ def _named(designs: Sequence[Design], names: Sequence[str], path: Path) -> list[
 
 def _outcome(objective: DesignObjective, stage: str, states: Mapping[tuple[str, str, str], Any],
              entry: Mapping[str, Any], q: np.ndarray | None) -> Evaluation | SimulationFailure | None:
-    """The objective's design after a stage; None when the files don't say enough."""
-    design = objective.design
+    """The objective's design after a stage, confirmed by Exudyn; None when the files don't say enough."""
     if "failed" in entry.get(stage, {}):
         return SimulationFailure(entry[stage]["failed"])
+    found = _judged(objective, stage, states, q)
+    return None if found is None else objective.confirm(found)
+
+
+def _opened(objective: DesignObjective, states: Mapping[tuple[str, str, str], Any], entry: Mapping[str, Any],
+            q: np.ndarray) -> Evaluation | SimulationFailure | None:
+    """The state that the assigned design opens into from its assembly; None when the files don't have it."""
+    if "failed" in entry.get(REDEPLOYED, {}):
+        return SimulationFailure(entry[REDEPLOYED]["failed"])
+    return _judged(objective, REDEPLOYED, states, q)
+
+
+def _judged(objective: DesignObjective, stage: str, states: Mapping[tuple[str, str, str], Any],
+            q: np.ndarray | None) -> Evaluation | None:
+    """The objective at a stage's saved states."""
+    design = objective.design
     saved = {role.name: states.get((design.name, stage, role.name)) for role in design.roles}
     if None in saved.values():
         return None
@@ -84,7 +113,7 @@ def _outcome(objective: DesignObjective, stage: str, states: Mapping[tuple[str, 
     if q is None:
         return None
     equilibria = {role.name: _equilibrium(design, role, stage, q, saved[role.name]) for role in design.roles}
-    return objective.confirm(objective.judge(q, equilibria))
+    return objective.judge(q, equilibria)
 
 
 def _reference(design: Design, states: Mapping[tuple[str, str, str], Any]) -> Reference:

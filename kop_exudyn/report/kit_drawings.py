@@ -5,7 +5,7 @@ from typing import Mapping, Sequence
 
 import numpy as np
 
-from ..analysis.kit_result import INPUT, STAGES, KitResult
+from ..analysis.kit_result import INPUT, REDEPLOYED, STAGES, KitResult
 from ..equilibrium.newton import Equilibrium
 from ..errors import SimulationFailure
 from ..kit.kinds import part_kind
@@ -105,12 +105,16 @@ def summary_rows(result: KitResult) -> tuple[list[str], list[list]]:
 
 
 def final_states(result: KitResult) -> dict[tuple[str, str, str], Equilibrium]:
-    """(design, stage, role) -> equilibrium, for all that were found; the designs as given are stage "input"."""
+    """(design, stage, role) -> equilibrium, for all that were found.
+
+    The designs as given are stage "input", those that opened from their assembly in the end stage "redeployed".
+    """
     inputs = {(design.name, INPUT, role): equilibrium for design, reference in zip(result.designs, result.references)
               for role, equilibrium in reference.equilibria.items()}
+    outcomes = {stage: found.designs for stage, found in result.stages.items()} | {REDEPLOYED: result.redeployed}
     return inputs | {(design.name, stage, role): equilibrium
-            for stage, found in result.stages.items() for design, outcome in zip(result.designs, found.designs)
-            if isinstance(outcome, Evaluation) for role, equilibrium in outcome.equilibria.items()}
+                     for stage, found in outcomes.items() for design, outcome in zip(result.designs, found)
+                     if isinstance(outcome, Evaluation) for role, equilibrium in outcome.equilibria.items()}
 
 
 def remarks(result: KitResult) -> list[str]:

@@ -20,8 +20,9 @@ def result(shells):
     """Two accepted steps a stage: the files don't need more."""
     settings = JobSettings(jobs=1, baselines=False, stages=StageSettings(
         schedule=(1e4,), relaxed_steps=2, assigned_steps=2, reassignments=0, path_steps=3))
-    outcome = run_job(shells, {"linear": 3, "angular": 2}, settings)
-    return KitResult(shells, outcome.references, outcome.stages)
+    events = []
+    outcome = run_job(shells, {"linear": 3, "angular": 2}, settings, observer=events.append)
+    return KitResult(shells, outcome.references, outcome.stages, events, redeployed=outcome.redeployed)
 
 
 def test_workshop_folder(parts, tmp_path):
@@ -40,7 +41,7 @@ def test_desk_folder(result, tmp_path):
     files = export_desk(result, tmp_path / "desk")
     assert {path.name for path in files} == {
         *(f"{name}_assigned_{role}.{suffix}" for name in ("first", "second") for role in ("deployed", "rest")
-          for suffix in ("obj", "ply", "glb", "vtu")), "designs.csv", "elements.csv", "joints.csv", "rods.csv"}
+          for suffix in ("obj", "ply", "glb", "vtu")), "designs.csv", "elements.csv", "joints.csv", "rods.csv", "steps.csv"}
     scene = trimesh.load(tmp_path / "desk" / "first_assigned_deployed.glb")
     assert set(scene.geometry) <= {"L1", "L2", "L3"}
     q = result.stages["assigned"].designs[0].q
@@ -57,6 +58,11 @@ def test_tables(result):
     assert float(row["max_percent"]) == final.designs[1].fit.max_percent
     assert float(row["deployed_utilisation"]) > float(row["rest_utilisation"]) >= 0
     assert row["deployed_stable"] == "true"
+    assert {r["stage"] for r in tables["designs"]} == {"input", "direct", "relaxed", "assigned", "redeployed"}
+    steps = [r for r in tables["steps"] if r["stage"] == "relaxed"]
+    assert len(steps) == result.stages["relaxed"].steps
+    assert float(steps[-1]["value"]) == pytest.approx(sum(float(v) for name, v in steps[-1].items()
+                                                          if name.startswith("term_") and v))
     elements = [r for r in tables["elements"] if r["design"] == "first"]
     assert len(elements) == result.designs[0].n_elements
     for r, piece in zip(elements, result.designs[0].groups[0].indices):

@@ -1,4 +1,6 @@
 """A finished run read back gives the result that was written."""
+import json
+
 import numpy as np
 import pytest
 
@@ -11,15 +13,17 @@ from kop_exudyn.optimize.fitting import TargetFitting
 from kop_exudyn.optimize.job import JobSettings, run_job
 from kop_exudyn.optimize.stage_results import Jump
 from kop_exudyn.optimize.stage_settings import StageSettings
-from kop_exudyn.report.kit_drawings import final_states, summary_rows
+from kop_exudyn.report.kit_drawings import final_states, histories, summary_rows
 
 
 @pytest.fixture(scope="module")
 def finished(shells, tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     stages = StageSettings(schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2)
-    outcome = run_job(shells, {"linear": 3, "angular": 2}, JobSettings(jobs=1, baselines=False, stages=stages))
-    result = KitResult(shells, outcome.references, outcome.stages)
+    events = []
+    outcome = run_job(shells, {"linear": 3, "angular": 2}, JobSettings(jobs=1, baselines=False, stages=stages),
+                      observer=events.append)
+    result = KitResult(shells, outcome.references, outcome.stages, events, redeployed=outcome.redeployed)
     result.stages["direct"].jumps.append(Jump(shells[0].name, 0.5, 0.07))
     save_result(folder / "result.json", result.to_dict())
     save_states(folder / "states.npz", final_states(result))
@@ -65,6 +69,34 @@ def test_snaps_belong_to_their_stages(finished, shells):
     assert (last.design, last.fraction) == (shells[0].name, 0.5) and last.distance == pytest.approx(0.07)
 
 
+def test_history_and_redeployed_designs_come_back(finished, shells, monkeypatch):
+    """Nothing is deployed anew for them."""
+    result, folder = finished
+    for design in shells:
+        monkeypatch.setattr(design, "deploy", None)
+    again = load_run(folder, shells)
+    assert again.events == result.events and {event.stage for event in again.events} == {"relaxed", "assigned"}
+    assert histories(again) == histories(result)
+    assert len(again.redeployed) == 2
+    for n, (a, b) in enumerate(zip(again.redeployed, result.redeployed)):
+        np.testing.assert_array_equal(a.q, b.q)
+        assert again.redeployment(n)["same_state"] == result.redeployment(n)["same_state"]
+        assert a.fit.max_percent == pytest.approx(b.fit.max_percent, rel=1e-6)
+
+
+def test_designs_that_could_not_be_opened_are_told(finished, shells, tmp_path):
+    result, folder = finished
+    data = json.loads((folder / "result.json").read_text())
+    data["designs"][1]["redeployed"] = {"failed": "buckled"}
+    (tmp_path / "result.json").write_text(json.dumps(data))
+    save_arrays(tmp_path / "states.npz", load_arrays(folder / "states.npz"))
+    assert str(load_run(tmp_path, shells).redeployed[1]) == "buckled"
+    data["history"][0]["value"] = []
+    (tmp_path / "result.json").write_text(json.dumps(data))
+    with pytest.raises(InputError, match="result.json: history: isn't a history of steps"):
+        load_run(tmp_path, shells)
+
+
 def test_strength_is_in_every_stage(finished):
     result, folder = finished
     for entry in load_result(folder / "result.json")["designs"]:
@@ -95,9 +127,12 @@ def test_folders_of_earlier_versions(finished, shells, tmp_path):
     old = {name: array for name, array in load_arrays(folder / "states.npz").items()
            if name.split("/")[1] != "input" and name.split("/")[3] not in ("parameters", "torque")}
     save_arrays(tmp_path / "states.npz", old)
-    (tmp_path / "result.json").write_bytes((folder / "result.json").read_bytes())
+    data = json.loads((folder / "result.json").read_text())
+    for name in ("history", "jumps", "status"):
+        del data[name]
+    (tmp_path / "result.json").write_text(json.dumps(data))
     again = load_run(tmp_path, shells)
-    assert list(again.stages) == ["assigned"]
+    assert list(again.stages) == ["assigned"] and again.events == []
     assert again.stages["assigned"].value == result.stages["assigned"].value
     assert again.references[0].energy == pytest.approx(result.references[0].energy, rel=1e-9)
 
