@@ -1,38 +1,104 @@
-"""``kop import``: a released umbrella mesh as a design file of our own."""
+"""``kop import``: a drawing of curves, or a released umbrella mesh, as a design file of our own."""
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
+from typing import Any
 
-HELP = "turn a released umbrella mesh into a design file"
-DESCRIPTION = """Reads an umbrella mesh in the format of its public release (JSON, gzipped or not) and writes it as a design of
-this project, in millimetres. Such files can also be used directly wherever a design is expected."""
+from .output import add_json, report
+from .values import angle, number_pair, positive_number
+
+HELP = "turn a drawing or a released umbrella mesh into a design file"
+DESCRIPTION = """Writes a design file from
+
+  a drawing (.obj: its polylines; .dxf, with the extra [fab]: lines, polylines, arcs, circles, ellipses, splines):
+  a C-shell, its curves hinged wherever they cross. The drawing lies in a plane parallel to two axes. Pieces that
+  meet end to end without a sharp corner become one curve.
+
+  an umbrella mesh in the format of its public release (.json or .json.gz): the same mesh, in millimetres. Such files
+  can also be used directly wherever a design is expected."""
 EXAMPLES = """examples:
-  kop import hemisphere_5t.json.gz --out hemisphere.json
+  kop import net.dxf --out net.json --opening 0.6 --section 0.03,0.004 --material 2.1e9,0.35
+  kop import net.obj --as c_shell --out net.json --opening 35deg --section 30,4 --material 2100,0.35 --scale 1000
   kop import hemisphere_5t.json.gz --out hemisphere.json --plates rigid"""
+
+_CLASSES = ("c_shell", "umbrella")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, metavar="FILE", help="released umbrella mesh (.json or .json.gz)")
+    parser.add_argument("file", type=Path, metavar="FILE", help="drawing (.obj, .dxf) or released umbrella mesh (.json, "
+                        ".json.gz)")
     parser.add_argument("--out", type=Path, required=True, metavar="DESIGN", help="design file to write (.json)")
-    parser.add_argument("--plates", choices=("rods", "rigid"), default="rods", help="model of the plates: rods that bend, "
-                        "as released, or rigid bodies, with fewer unknowns (default: %(default)s)")
+    parser.add_argument("--as", dest="kind", choices=_CLASSES,
+                        help="class of the design (default: c_shell of drawings, umbrella of released meshes)")
     parser.add_argument("--overwrite", action="store_true", help="replace the file if it exists")
+    shell = parser.add_argument_group("C-shells", "opening, section and material are needed")
+    shell.add_argument("--opening", type=angle, metavar="ANGLE", help="change of the mean angle between curves from "
+                       "assembly to deployment, in radians or as 35deg")
+    shell.add_argument("--section", type=number_pair, metavar="WIDTH,HEIGHT", help="of the rods: across the plane's "
+                       "normal and along it")
+    shell.add_argument("--material", type=number_pair, metavar="YOUNG,POISSON", help="Young's modulus and Poisson's ratio")
+    shell.add_argument("--density", type=positive_number, metavar="RHO", help="of the material, for its weight")
+    shell.add_argument("--elastic-limit", type=positive_number, metavar="SIGMA", help="of the material, for its strength")
+    shell.add_argument("--curves", choices=("spline", "polyline"), default="spline", help="curves go smoothly through "
+                       "the points of polylines, or keep their corners (default: %(default)s)")
+    shell.add_argument("--free-ends", action="store_true", help="keep the rods' ends beyond their last joint")
+    shell.add_argument("--layer", action="append", default=[], metavar="NAME", help="of DXF files, the layer to read; "
+                       "may be given several times (default: all)")
+    shell.add_argument("--scale", type=positive_number, default=1.0, metavar="S", help="multiply the drawing's "
+                       "coordinates by this, as 0.001 for millimetres to metres (default: 1)")
+    umbrella = parser.add_argument_group("umbrella meshes")
+    umbrella.add_argument("--plates", choices=("rods", "rigid"), default="rods", help="model of the plates: rods that "
+                          "bend, as released, or rigid bodies, with fewer unknowns (default: %(default)s)")
+    add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     from ..errors import InputError
+    from ..io.curve_files import CURVE_READERS
     from ..io.files import check_output_file
-    from ..io.json_files import read_json, write_json
+    from ..io.json_files import write_json
+
+    check_output_file(args.out, overwrite=args.overwrite)
+    drawn = args.file.suffix.lower() in CURVE_READERS
+    wanted = args.kind or ("c_shell" if drawn else "umbrella")
+    if drawn != (wanted == "c_shell"):
+        raise InputError(f"can't be made of this file: expected "
+                         f"{'a released mesh' if drawn else ' or '.join(CURVE_READERS)}", source=args.file, field="--as",
+                         value=wanted)
+    data = _c_shell(args) if drawn else _umbrella(args)
+    write_json(args.out, data, overwrite=args.overwrite)
+    report(args, {"design": args.out, "class": data["class"], "name": data["name"]}, f"{args.out}\n")
+    return 0
+
+
+def _c_shell(args: argparse.Namespace) -> dict[str, Any]:
+    from ..errors import InputError
+    from ..io.drawn_networks import c_shell_data, read_network
+    from ..structures.base import design_from_dict
+
+    for name in ("opening", "section", "material"):
+        if getattr(args, name) is None:
+            raise InputError(f"a C-shell needs --{name}", source=args.file)
+    width, height = args.section
+    young, poisson = args.material
+    material = {"young": young, "poisson": poisson, "density": args.density, "elastic_limit": args.elastic_limit}
+    curves = read_network(args.file, args.layer, kind=args.curves, scale=args.scale, free_ends=args.free_ends)
+    data = c_shell_data(args.file.stem, curves, {"type": "rectangle", "width": width, "height": height},
+                        {name: value for name, value in material.items() if value is not None}, args.opening,
+                        free_ends=args.free_ends)
+    design_from_dict(data, str(args.file))  # complains about what no C-shell can be made of
+    return data
+
+
+def _umbrella(args: argparse.Namespace) -> dict[str, Any]:
+    from ..errors import InputError
+    from ..io.json_files import read_json
     from ..structures.umbrella_import import import_release
     from ..structures.umbrella_release import is_release
 
-    check_output_file(args.out, overwrite=args.overwrite)
     data = read_json(args.file)
     if not is_release(data):
         raise InputError("isn't a released umbrella mesh", source=args.file)
     name = args.file.name.removesuffix(".gz").removesuffix(".json")
-    write_json(args.out, import_release(data, name, str(args.file), args.plates), overwrite=args.overwrite)
-    sys.stdout.write(f"{args.out}\n")
-    return 0
+    return import_release(data, name, str(args.file), args.plates)

@@ -40,15 +40,46 @@ def not_negative(text: str) -> int:
     return _whole(text, 0, "the value")
 
 
+def positive_number(text: str) -> float:
+    """A finite number larger than 0."""
+    value = _numbers(text, (1,))
+    if not value or value[0] <= 0:
+        raise argparse.ArgumentTypeError(f"expected a positive number, got {text!r}")
+    return value[0]
+
+
+def number_pair(text: str) -> tuple[float, float]:
+    """``30,4`` as (30.0, 4.0); whether they make sense is checked where they are used."""
+    values = _numbers(text, (2,))
+    if not values:
+        raise argparse.ArgumentTypeError(f"expected two numbers A,B, got {text!r}")
+    return values[0], values[1]
+
+
+def angle(text: str) -> float:
+    """An angle in radians; ``35deg`` in degrees."""
+    degrees = text.removesuffix("deg")
+    value = _numbers(degrees, (1,))
+    if not value:
+        raise argparse.ArgumentTypeError(f"expected an angle in radians, or as 35deg, got {text!r}")
+    return math.radians(value[0]) if degrees != text else value[0]
+
+
 def gravity(text: str) -> tuple[float, float, float]:
     """``9.81`` as (0, 0, -9.81), down the z axis; ``0,0,-9.81`` as it is."""
-    try:
-        numbers = [float(piece) for piece in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) not in (1, 3) or not all(map(math.isfinite, numbers)):
+    numbers = _numbers(text, (1, 3))
+    if not numbers:
         raise argparse.ArgumentTypeError(f"expected a number or X,Y,Z, got {text!r}")
-    return (0.0, 0.0, -numbers[0]) if len(numbers) == 1 else tuple(numbers)
+    return (0.0, 0.0, -numbers[0]) if len(numbers) == 1 else (numbers[0], numbers[1], numbers[2])
+
+
+def _numbers(text: str, counts: tuple[int, ...]) -> list[float]:
+    """Finite numbers between commas; none where their count isn't one of these, or the text is something else."""
+    try:
+        values = [float(piece) for piece in text.split(",")]
+    except ValueError:
+        return []
+    return values if len(values) in counts and all(map(math.isfinite, values)) else []
 
 
 def _whole(text: str, least: int, what: str) -> int:

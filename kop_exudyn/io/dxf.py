@@ -16,7 +16,7 @@ _COLOURS = {CUT: 1, ENGRAVE: 5, NOTES: 8}  # AutoCAD's colour numbers: red, blue
 
 def dxf_text(sheet: Sheet) -> str:
     """The sheet as DXF. Raises InputError without ezdxf."""
-    ezdxf = _ezdxf()
+    ezdxf = load_ezdxf()
     with _without_dates(ezdxf.options):
         document = ezdxf.new("R2010", units=ezdxf.units.MM)
         _fill(ezdxf, document, sheet)
@@ -57,7 +57,8 @@ def _without_dates(options: Any) -> Iterator[None]:
         options.write_fixed_meta_data_for_testing = before
 
 
-def _ezdxf() -> Any:
+def load_ezdxf() -> Any:
+    """The library. Raises InputError without it."""
     try:
         import ezdxf
         import ezdxf.enums

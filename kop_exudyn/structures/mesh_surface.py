@@ -17,6 +17,7 @@ from scipy.sparse.linalg import spsolve
 
 from ..errors import InputError
 from ..scene.surface import TriangleSurface
+from .mesh_files import read_mesh
 from .surfaces import Surface
 
 _DEGREE = 3
@@ -25,7 +26,6 @@ _VERTICES_A_CELL = 4.0
 _PENALTY = 1e-5  # of the mean data weight of a coefficient
 _MAX_DEVIATION = 0.01  # of the bounding box's diagonal
 _AXES = {"x": (1, 2, 0), "y": (2, 0, 1), "z": (0, 1, 2)}
-_SUFFIXES = (".obj", ".ply", ".stl")
 
 
 class MeshSurface(Surface):
@@ -104,22 +104,8 @@ class MeshSurface(Surface):
 
 
 def load_mesh_surface(path: Path, chart: str = "plane", up: str = "z") -> MeshSurface:
-    """The surface of an OBJ, PLY or STL file. Raises InputError naming the file."""
-    if path.suffix.lower() not in _SUFFIXES:
-        raise InputError(f"is no mesh file (known: {', '.join(_SUFFIXES)})", field="surface.file", value=path.name)
-    if not path.is_file():
-        raise InputError("no such file", field="surface.file", value=str(path))
-    try:
-        import trimesh
-    except ImportError:
-        raise InputError("reading meshes needs trimesh (pip install 'kop_exudyn[mesh]')", field="surface.file",
-                         value=path.name) from None
-    try:
-        mesh = trimesh.load_mesh(path, process=True)
-        vertices, faces = np.array(mesh.vertices, float), np.array(mesh.faces, int)
-    except Exception as error:  # the readers raise whatever the broken file leads them to
-        raise InputError(f"can't be read as a mesh: {str(error)[:100]}", field="surface.file", value=path.name) from None
-    return MeshSurface(vertices, faces, chart, up)
+    """The surface of a mesh file, see `read_mesh`. Raises InputError naming the file."""
+    return MeshSurface(*read_mesh(path), chart, up)
 
 
 def _basis(knots: np.ndarray, n: int) -> list[BSpline]:
