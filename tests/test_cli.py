@@ -121,7 +121,6 @@ class TestArguments:
         ((), "required: COMMAND"),
         (("fly",), "invalid choice: 'fly'"),
         (("simulate",), "required: DESIGN"),
-        (("optimize", "x", "--out", "y"), "required: --parts"),
         (("optimize", "x", "--parts", "linear=1"), "required: --out"),
         (("optimize", "x", "--parts", "linear=1", "--out", "y", "--jobs", "0"), "--jobs: the value must be a whole"),
         (("optimize", "x", "--parts", "linear=1", "--out", "y", "--designs", "0"), "--designs: the number of"),
@@ -207,12 +206,31 @@ class TestOptimize:
         assert status_of("optimize", design_file.parent, "--parts", "linear=12,angular=5", "--out", out, "--seed", 3,
                          "--jobs", 2, "--max-steps", 7, "--designs", 1, "--resume", "-q") == 0
         assert asked["designs"] == ["arch"] and asked["parts"] == {"linear": 12, "angular": 5}
-        assert asked["out"] == out and asked["inputs"] == [design_file]
+        assert asked["out"] == out and asked["inputs"] == (design_file,)
         assert (asked["resume"], asked["overwrite"], asked["progress"]) == (True, False, False)
         settings = asked["settings"]
         assert (settings.jobs, settings.stages.seed) == (2, 3)
         assert settings.stages.relaxed_steps == settings.stages.assigned_steps == 7
         assert capsys.readouterr().out == f"{out / 'index.html'}\n"
+
+    def test_a_study_file_and_options_that_come_before_it(self, asked, design_file, tmp_path, capsys):
+        study = tmp_path / "study.toml"
+        study.write_text('format = "kop_exudyn/study"\nversion = 1\ndesigns = ["set/arch.json"]\nbaselines = false\n'
+                         "parts = {linears = 7}\nsettings = {seed = 4, redeployments = 2, relaxed_steps = 9}\n")
+        assert status_of("optimize", study, "--out", tmp_path / "out", "--jobs", 1) == 0
+        assert asked["parts"] == {"linear": 7} and asked["inputs"] == (design_file,)
+        settings = asked["settings"]
+        assert (settings.stages.seed, settings.stages.redeployments, settings.stages.relaxed_steps) == (4, 2, 9)
+        assert settings.baselines is False
+        assert status_of("optimize", study, "--out", tmp_path / "out", "--seed", 0, "--parts", "linear=3,angular=1",
+                         "--max-steps", 5) == 0
+        assert asked["parts"] == {"linear": 3, "angular": 1}
+        stages = asked["settings"].stages
+        assert (stages.seed, stages.redeployments, stages.relaxed_steps, stages.assigned_steps) == (0, 2, 5, 5)
+
+    def test_parts_must_come_from_somewhere(self, asked, design_file, tmp_path, capsys):
+        assert status_of("optimize", design_file.parent, "--out", tmp_path / "out") == 2
+        assert "--parts is required" in capsys.readouterr().err and "parts" not in asked
 
     def test_a_design_that_fails_in_the_end(self, asked, design_file, tmp_path, capsys):
         asked["failed"] = ["arch"]

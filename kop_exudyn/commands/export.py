@@ -16,7 +16,8 @@ EXAMPLES = """examples:
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("result", type=Path, metavar="RESULT", help="folder of a finished run")
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="folder of the designs that it was made from")
+    parser.add_argument("folder", type=Path, metavar="FOLDER|STUDY",
+                        help="folder of the designs that it was made from, or study file")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write to")
     parser.add_argument("--unit", required=True, choices=("mm", "cm", "m"), help="the designs' unit of length")
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist")

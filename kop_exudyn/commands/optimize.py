@@ -1,4 +1,4 @@
-"""``kop optimize``: one kit of parts for the designs of a folder."""
+"""``kop optimize``: one kit of parts for the designs of a folder or a study file."""
 from __future__ import annotations
 
 import argparse
@@ -8,31 +8,36 @@ from pathlib import Path
 from .values import design_selection, not_negative, part_counts, positive
 
 HELP = "find one kit of parts for several designs"
-DESCRIPTION = """Finds one kit of parts from which all designs of a folder can be built. DIR gets result.json,
-kit.json, the final states, figures and index.html, which shows them. Checkpoints are written on the way:
+DESCRIPTION = """Finds one kit of parts from which all designs of a folder, or of a study file, can be built. DIR gets
+result.json, kit.json, the final states, figures and index.html, which shows them. Checkpoints are written on the way:
 --resume goes on where a run was stopped, and gives the same result. Running the same job again replaces its
-results."""
+results.
+
+A study file is TOML: format = "kop_exudyn/study", version = 1, designs (a list of files or folders), and, if wanted,
+the tables parts, weights and settings. Options given here come before what it says."""
 EXAMPLES = """examples:
   kop optimize models/conformals --designs 3 --parts linear=12,angular=5 --out out/kit
   kop optimize models/conformals --designs 02_tanh,07_log --parts linear=8,angular=3 --out out/pair
-  kop optimize models/conformals --parts linear=12,angular=5 --out out/kit --resume"""
+  kop optimize models/conformals --parts linear=12,angular=5 --out out/kit --resume
+  kop optimize study.toml --out out/kit --seed 1"""
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="folder of design files")
-    parser.add_argument("--parts", type=part_counts, required=True, metavar="KIND=N,...",
-                        help="how many parts of each kind, as linear=12,angular=5")
+    parser.add_argument("folder", type=Path, metavar="FOLDER|STUDY",
+                        help="folder of design files, or a study file (.toml)")
+    parser.add_argument("--parts", type=part_counts, metavar="KIND=N,...",
+                        help="how many parts of each kind, as linear=12,angular=5 (default: what the study says)")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the results")
     parser.add_argument("--designs", type=design_selection, metavar="N|NAMES",
-                        help="the first N designs of the folder, or names of files without .json (default: all)")
+                        help="the first N designs, or names of files without .json (default: all)")
     parser.add_argument("--resume", action="store_true", help="go on from the checkpoints in DIR")
     parser.add_argument("--overwrite", action="store_true", help="write to DIR even if it holds something else")
     parser.add_argument("--jobs", type=positive, metavar="N",
                         help="processes that solve designs (default: one a core); the result doesn't depend on it")
-    parser.add_argument("--seed", type=not_negative, default=0, metavar="N", help="of the clustering (default: 0)")
+    parser.add_argument("--seed", type=not_negative, metavar="N", help="of the clustering (default: 0)")
     parser.add_argument("--max-steps", type=positive, metavar="N",
                         help="accepted steps at most, in each round of either stage")
-    parser.add_argument("--redeployments", type=not_negative, default=0, metavar="N",
+    parser.add_argument("--redeployments", type=not_negative, metavar="N",
                         help="how often the designs are then opened from their assembly and the second stage goes on "
                         "from where they end, so that they open into their shape by themselves (default: 0)")
 
@@ -40,27 +45,32 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from dataclasses import replace
 
-    from ..io.designs import load_designs, select_files
-    from ..optimize.job import JobSettings
-    from ..optimize.stage_settings import StageSettings
+    from ..errors import InputError
+    from ..io.studies import load_study
     from ..report.environment import usable_cores
     from ..report.kit_run import optimize_kit
 
-    parts = {_singular(kind): count for kind, count in args.parts.items()}
-    stages = StageSettings(seed=args.seed, redeployments=args.redeployments)
-    if args.max_steps is not None:
-        stages = replace(stages, relaxed_steps=args.max_steps, assigned_steps=args.max_steps,
-                         round_steps=args.max_steps)
-    result = optimize_kit(
-        load_designs(args.folder, args.designs), parts, out=args.out,
-        settings=JobSettings(stages=stages, jobs=args.jobs or usable_cores()),
-        inputs=select_files(args.folder, args.designs), resume=args.resume, overwrite=args.overwrite,
-        progress=not args.quiet)
+    study = load_study(args.folder, args.designs)
+    parts = {_singular(kind): count for kind, count in (args.parts or study.parts).items()}
+    if not parts:
+        raise InputError("says nothing of the parts: --parts is required", source=args.folder)
+    study = replace(study, settings=replace(study.settings, **_given(args)))
+    designs = study.designs()
+    result = optimize_kit(designs, parts, out=args.out, inputs=study.files, resume=args.resume,
+                          settings=study.job_settings(designs, args.jobs or usable_cores()), overwrite=args.overwrite,
+                          progress=not args.quiet)
     failed = [design.name for n, design in enumerate(result.designs) if "failed" in result.summary("assigned", n)]
     sys.stdout.write(f"{args.out / 'index.html'}\n")
     if failed:
         sys.stderr.write(f"kop: these designs can't be built from the kit: {', '.join(failed)}\n")
     return 1 if failed else 0
+
+
+def _given(args: argparse.Namespace) -> dict[str, int]:
+    """The stages' settings that options give."""
+    steps = dict.fromkeys(("relaxed_steps", "assigned_steps", "round_steps"), args.max_steps)
+    given = {"seed": args.seed, "redeployments": args.redeployments, **steps}
+    return {name: value for name, value in given.items() if value is not None}
 
 
 def _singular(kind: str) -> str:

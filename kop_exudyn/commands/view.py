@@ -24,8 +24,8 @@ EXAMPLES = """examples:
 def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("what", type=Path, metavar="RESULT|DESIGN",
                         help="folder of a finished run, or a design file (.json or .json.gz)")
-    parser.add_argument("folder", type=Path, nargs="?", metavar="FOLDER",
-                        help="of a result: the folder of the designs that it was made from")
+    parser.add_argument("folder", type=Path, nargs="?", metavar="FOLDER|STUDY",
+                        help="of a result: the folder of the designs that it was made from, or the study file")
     parser.add_argument("--out", type=Path, required=True, metavar="PAGE", help="page to write (.html)")
     parser.add_argument("--frames", type=not_negative, default=8, metavar="N",
                         help="states to solve for on the way to the opening (default: 8)")

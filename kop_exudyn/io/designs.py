@@ -1,9 +1,9 @@
-"""Design files: JSON in the format "kop_exudyn/design", one design a file, a dataset a folder of them."""
+"""Design files: JSON in the format "kop_exudyn/design", one design a file, a dataset a folder or a study file."""
 from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Sequence
+from typing import Iterable, Sequence
 
 from ..errors import InputError
 from ..structures.base import Design, design_from_dict
@@ -39,17 +39,22 @@ def load_design(path: str | Path) -> Design:
 
 
 def load_designs(folder: str | Path, select: int | Sequence[str] | None = None) -> list[Design]:
-    """The designs of a folder in the natural order of their file names (design_2 before design_10).
+    """The designs of a folder in the natural order of their file names (design_2 before design_10), or of a study file.
 
     select : the first so many, or the names of files without their ending, in the order wanted; default: all
 
     Raises InputError when there aren't that many, for unknown names, and when two designs have the same name.
     """
-    designs = [load_design(path) for path in select_files(folder, select)]
+    return load_all(select_files(folder, select), folder)
+
+
+def load_all(files: Iterable[Path], source: str | Path) -> list[Design]:
+    """The designs of these files; InputError, naming the source, when two have the same name."""
+    designs = [load_design(path) for path in files]
     seen: dict[str, Design] = {}
     for design in designs:
         if design.name in seen:
-            raise InputError("two designs have the same name", source=folder, field="name", value=design.name)
+            raise InputError("two designs have the same name", source=source, field="name", value=design.name)
         seen[design.name] = design
     return designs
 
@@ -68,7 +73,15 @@ def design_files(folder: str | Path) -> list[Path]:
 
 def select_files(folder: str | Path, select: int | Sequence[str] | None = None) -> list[Path]:
     """The files that `load_designs` reads, without reading them; raises its errors about the selection."""
-    paths = design_files(folder)
+    from .studies import is_study, load_study  # which reads designs itself
+
+    return list(load_study(folder, select).files) if is_study(folder) else select_among(design_files(folder), select,
+                                                                                         folder)
+
+
+def select_among(paths: Sequence[Path], select: int | Sequence[str] | None, folder: str | Path) -> list[Path]:
+    """Some of these files, see `load_designs`; errors name the folder."""
+    paths = list(paths)
     if select is None:
         return paths
     if isinstance(select, int):

@@ -11,7 +11,7 @@ from ..equilibrium.newton import Equilibrium, Start, solve
 from ..errors import InputError, SimulationFailure
 from ..kit.parts import Assignment, Kit
 from ..optimize.events import events_from_list
-from ..optimize.objective import DesignObjective, Evaluation, Reference, reference_of
+from ..optimize.objective import DesignObjective, Evaluation, Reference, Weights, reference_of
 from ..optimize.stage_results import Jump, StageEvent, StageResult
 from ..scene.state import State
 from ..structures.base import Design, Role
@@ -42,7 +42,9 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
     assignment = Assignment.from_dict(data["assignment"], groups, int(offsets[-1]), kit, source=str(path))
     realised = np.split(assignment.matrix(kit) @ kit.vector, offsets[1:-1])
     references = [_reference(design, states) for design in designs]
-    objectives = [DesignObjective(design, reference=reference) for design, reference in zip(designs, references)]
+    weights = _weights(data["settings"], designs)
+    objectives = [DesignObjective(design, weights, reference=reference)
+                  for design, reference in zip(designs, references)]
     result = KitResult(list(designs), references, {}, settings=data["settings"], equilibria=data["equilibria"],
                        newton_iterations=data["newton_iterations"], wall_s=data["wall_s"],
                        peak_memory_mb=data["peak_memory_mb"], events=_history(data, path))
@@ -59,6 +61,12 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
     if None not in opened:
         result.redeployed = opened
     return result
+
+
+def _weights(settings: Mapping[str, Any], designs: Sequence[Design]) -> Weights:
+    """The weights that the run was made with; those of its designs' class where it says nothing."""
+    given = settings.get("weights")
+    return Weights(**given) if given else Weights(fit=max(design.fit_weight for design in designs))
 
 
 def _history(data: Mapping[str, Any], path: Path) -> list[StageEvent]:

@@ -1,0 +1,126 @@
+"""Study files: TOML in the format "kop_exudyn/study", which says for what designs a kit is sought, and how."""
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Mapping, Sequence
+
+import numpy as np
+
+from ..errors import InputError
+from ..kit.kinds import Bounds
+from ..optimize.job import JobSettings
+from ..optimize.objective import Weights
+from ..optimize.stage_settings import StageSettings
+from ..structures.base import Design
+from .designs import design_files, load_all, select_among
+from .documents import check_envelope, check_range, check_schema
+from .files import read_bytes
+
+STUDY_VERSION = 1
+STUDY_SUFFIX = ".toml"
+
+
+@dataclass(frozen=True)
+class Study:
+    """What a kit is sought for.
+
+    source : the study's file, or a folder of designs
+    files : of the designs, in order
+    parts : kind -> number of parts; empty where nothing is said about them
+    weights : those of the objective's terms that are given
+    counts : how much each design counts, like `files`
+    settings : of the stages
+    baselines : whether the unrelaxed baseline is computed
+    """
+
+    source: Path
+    files: tuple[Path, ...]
+    parts: Mapping[str, int] = field(default_factory=dict)
+    weights: Mapping[str, float] = field(default_factory=dict)
+    counts: tuple[float, ...] = ()
+    settings: StageSettings = StageSettings()
+    baselines: bool = True
+
+    def designs(self) -> list[Design]:
+        """The designs; raises InputError as `load_designs`."""
+        return load_all(self.files, self.source)
+
+    def job_settings(self, designs: Sequence[Design], jobs: int) -> JobSettings:
+        """Settings of a job for these designs, which are the study's own, with that many processes."""
+        weights = None
+        if self.weights:
+            weights = Weights(**{"fit": max(design.fit_weight for design in designs), **self.weights})
+        counts = self.counts if set(self.counts) - {1.0} else None
+        return JobSettings(weights, counts, self.settings, jobs, self.baselines)
+
+
+def load_study(path: str | Path, select: int | Sequence[str] | None = None) -> Study:
+    """The study of a TOML file, or of all designs of a folder with the usual settings.
+
+    select : of the designs, as for `load_designs`
+
+    Raises InputError naming the file, the field and the value when anything is wrong; designs aren't read yet.
+    """
+    path = Path(path)
+    study = _from_file(path) if is_study(path) else Study(path, tuple(design_files(path)))
+    files = tuple(select_among(study.files, select, path))
+    counts = dict(zip(study.files, study.counts or (1.0,) * len(study.files)))
+    return Study(path, files, study.parts, study.weights, tuple(counts[file] for file in files), study.settings,
+                 study.baselines)
+
+
+def is_study(path: str | Path) -> bool:
+    """Whether this would be a study's file, and no folder of designs."""
+    path = Path(path)
+    return path.suffix.lower() == STUDY_SUFFIX and not path.is_dir()
+
+
+def _from_file(path: Path) -> Study:
+    data = _read_toml(path)
+    check_envelope(data, "study", STUDY_VERSION, source=path)
+    check_range(data, source=path)
+    check_schema(data, "study", source=path)
+    weights = data.get("weights", {})
+    if weights.get("fit") == 0 and weights.get("energy") == 0:
+        raise InputError("fit and energy can't both be 0", source=path, field="weights", value=weights)
+    counts = _files(data["designs"], path)
+    settings = dict(data.get("settings", {}))
+    if "schedule" in settings:
+        settings["schedule"] = tuple(settings["schedule"])
+    if "bounds" in settings:
+        settings["bounds"] = _bounds(settings["bounds"])
+    return Study(path, tuple(counts), data.get("parts", {}), weights, tuple(counts.values()),
+                 StageSettings(**settings), data.get("baselines", True))
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(read_bytes(path).decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise InputError(f"not UTF-8 text (byte {error.start})", source=path) from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(f"not TOML: {error}", source=path) from None
+
+
+def _files(entries: Sequence[str | Mapping[str, Any]], path: Path) -> dict[Path, float]:
+    """Design files with their weights, in order; folders stand for all designs in them."""
+    found: dict[Path, float] = {}
+    for n, entry in enumerate(entries):
+        name, weight = (entry, 1.0) if isinstance(entry, str) else (entry["file"], float(entry.get("weight", 1.0)))
+        place = path.parent / name
+        if not place.exists():
+            raise InputError("no such file or folder", source=path, field=f"designs[{n}]", value=name)
+        for file in design_files(place) if place.is_dir() else [place]:
+            if file.name in {other.name for other in found}:
+                raise InputError("two design files have the same name", source=path, field=f"designs[{n}]",
+                                 value=file.name)
+            found[file] = weight
+    return found
+
+
+def _bounds(data: Mapping[str, Mapping[str, Any]]) -> Bounds:
+    """By kind (lower, upper); what isn't given is no bound."""
+    return {kind: tuple(np.array(given.get(side, none), float) for side, none in (("lower", -np.inf), ("upper", np.inf)))
+            for kind, given in data.items()}
