@@ -11,6 +11,7 @@ from typing import NoReturn, Sequence
 
 from . import __version__
 from .commands import NAMES
+from .commands.colour import RED, LogFormatter, coloured
 from .errors import InputError, SimulationFailure
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -18,9 +19,17 @@ OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 _DESCRIPTION = "Kits of parts for bending-active structures: one small set of pieces that builds many designs."
 _STATUS = """exit status:
   0    success
-  1    a simulation failed
+  1    a simulation failed, or a design can't be built from the kit
   2    unusable input: one line on standard error says what is wrong
   130  interrupted"""
+_EPILOG = f"""examples:
+  kop simulate models/conformals/01_sinh.json
+  kop optimize models/conformals --designs 3 --parts linear=12,angular=5 --out out/kit
+  kop COMMAND --help
+
+{_STATUS}
+
+All commands take --json, --quiet and --verbose. Messages are coloured on terminals, unless NO_COLOR is set."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -55,7 +64,7 @@ def make_parser() -> argparse.ArgumentParser:
     group = verbosity.add_mutually_exclusive_group()
     group.add_argument("-q", "--quiet", action="store_true", help="no progress, errors only")
     group.add_argument("-v", "--verbose", action="count", default=0, help="say what is being done; twice: every detail")
-    parser = _Parser(prog="kop", description=_DESCRIPTION, epilog=_STATUS,
+    parser = _Parser(prog="kop", description=_DESCRIPTION, epilog=_EPILOG,
                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--version", action="version", version=f"kop_exudyn {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
@@ -74,10 +83,10 @@ def _set_up_logging(args: argparse.Namespace) -> None:
     logger = logging.getLogger(__package__)
     logger.setLevel(level)
     handler = logging.StreamHandler()
-    handler.setFormatter(logging.Formatter("kop: %(levelname)s: %(message)s"))
+    handler.setFormatter(LogFormatter(handler.stream))
     logger.handlers[:] = [handler]  # once only, also when main is called again
 
 
 def _complain(message: str, status: int) -> int:
-    sys.stderr.write(f"kop: {' '.join(message.split())}\n")
+    sys.stderr.write(f"{coloured('kop:', RED, sys.stderr)} {' '.join(message.split())}\n")
     return status

@@ -1,4 +1,5 @@
 """The command line: what it accepts, what it says, and with which exit status it ends."""
+import io
 import json
 import logging
 import subprocess
@@ -68,7 +69,7 @@ class TestHelp:
     def test_help_lists_commands_and_exit_status(self, capsys):
         assert status_of("--help") == 0
         text = capsys.readouterr().out
-        for word in (*NAMES, "exit status", "130"):
+        for word in (*NAMES, "exit status", "130", "examples:", "NO_COLOR"):
             assert word in text
 
     @pytest.mark.parametrize("name", NAMES)
@@ -76,6 +77,8 @@ class TestHelp:
         assert status_of(name, "--help") == 0
         text = capsys.readouterr().out
         assert f"examples:\n  kop {name} " in text and "exit status" in text
+        for option in ("--json", "--quiet", "--verbose"):
+            assert option in text
         assert max(map(len, text.splitlines())) <= 120
 
     def test_version(self, capsys):
@@ -84,7 +87,7 @@ class TestHelp:
 
     def test_help_is_quick_and_loads_no_library(self):
         code = ("import sys\nfrom kop_exudyn.cli import make_parser\nmake_parser().format_help()\n"
-                "print(*(m for m in ('numpy', 'scipy', 'exudyn', 'matplotlib', 'jsonschema') if m in sys.modules))")
+                "print(*(m for m in ('numpy', 'scipy', 'exudyn', 'matplotlib', 'jsonschema', 'shtab') if m in sys.modules))")
         begin = time.perf_counter()
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
         assert done.stdout.strip() == ""
@@ -234,8 +237,13 @@ class TestOptimize:
 
     def test_a_design_that_fails_in_the_end(self, asked, design_file, tmp_path, capsys):
         asked["failed"] = ["arch"]
-        assert status_of("optimize", design_file.parent, "--parts", "linear=1", "--out", tmp_path / "out") == 1
+        arguments = ("optimize", design_file.parent, "--parts", "linear=1", "--out", tmp_path / "out")
+        assert status_of(*arguments) == 1
         assert "can't be built from the kit: arch" in capsys.readouterr().err
+        assert status_of(*arguments, "--json") == 1
+        data = json.loads(capsys.readouterr().out)
+        assert data["designs"] == [{"name": "arch", "failed": "no"}]
+        assert data["result"] == (tmp_path / "out" / "result.json").as_posix()
 
     def test_designs_by_name(self, asked, design_file, tmp_path, capsys):
         arguments = ("optimize", design_file.parent, "--parts", "linear=1", "--out", tmp_path / "out", "--designs")
@@ -250,6 +258,28 @@ def test_verbosity(design_file, simulated):
         assert status_of("simulate", design_file, *flags) == 0
         assert logging.getLogger("kop_exudyn").level == level
         assert len(logging.getLogger("kop_exudyn").handlers) == 1
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+@pytest.mark.parametrize("variables, coloured", [
+    ({}, True), ({"NO_COLOR": "1"}, False), ({"NO_COLOR": ""}, True), ({"TERM": "dumb"}, False)])
+def test_colours_on_terminals_only(variables, coloured, monkeypatch, tmp_path, capsys):
+    for name, value in ({"TERM": "xterm"} | variables).items():
+        monkeypatch.setenv(name, value)
+    if "NO_COLOR" not in variables:
+        monkeypatch.delenv("NO_COLOR", raising=False)
+    assert status_of("simulate", tmp_path / "no.json") == 2
+    assert "\033" not in capsys.readouterr().err
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    assert status_of("simulate", tmp_path / "no.json") == 2
+    assert sys.stderr.getvalue().startswith("\033[31mkop:\033[0m " if coloured else "kop: ")
+    logging.getLogger("kop_exudyn").warning("mind the gap")
+    assert sys.stderr.getvalue().endswith("kop: \033[33mWARNING\033[0m: mind the gap\n" if coloured else
+                                          "kop: WARNING: mind the gap\n")
 
 
 def test_messages_are_one_line_whatever_the_value(design_file, simulated, capsys):

@@ -41,8 +41,8 @@ def run(tmp_path_factory):
 
 def test_view_shows_all_stages_and_the_way_to_the_opening(run, tmp_path, capsys):
     page = tmp_path / "kit.html"
-    assert main(["view", *map(str, run), "--out", str(page), "--frames", "2"]) == 0
-    assert capsys.readouterr().out == f"{page}\n"
+    assert main(["view", *map(str, run), "--out", str(page), "--frames", "2", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"page": str(page)}
     found = re.search(r'id="scene">(.*?)</script>', page.read_text(encoding="utf-8"), re.S)
     data = json.loads(found.group(1))
     assert [design["name"] for design in data["designs"]] == ["flat", "bent"]
@@ -76,8 +76,10 @@ def test_unusable_requests_of_view(run, tmp_path, capsys):
 
 
 def test_export_writes_a_labelled_drawing_of_every_design(run, tmp_path, capsys):
-    assert main(["export", *map(str, run), "--unit", "m", "--out", str(tmp_path / "files")]) == 0
+    assert main(["export", *map(str, run), "--unit", "m", "--out", str(tmp_path / "files"), "--json"]) == 0
+    written = json.loads(capsys.readouterr().out)["files"]
     workshop = tmp_path / "files" / "workshop"
+    assert set(written) == {str(path) for path in (tmp_path / "files").rglob("*.*")}
     result = load_run(run[0], load_designs(run[1]))
     for design in result.designs:
         for suffix in ("csv", "svg", "pdf"):

@@ -2,8 +2,9 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
+
+from .output import add_json, report
 
 HELP = "write cut lists, cut sheets, assembly plans and 3D files of a finished kit"
 DESCRIPTION = """Reads the folder that `kop optimize` wrote, and writes two folders: workshop (cut list, bills and
@@ -21,6 +22,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write to")
     parser.add_argument("--unit", required=True, choices=("mm", "cm", "m"), help="the designs' unit of length")
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
+    add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -38,5 +40,5 @@ def run(args: argparse.Namespace) -> int:
                            overwrite=args.overwrite)
     done += save_assembly_drawings(result, args.out / "workshop", overwrite=args.overwrite)
     done += export_desk(result, args.out / "desk", overwrite=args.overwrite)
-    sys.stdout.write(f"{len(done)} files in {args.out}\n")
+    report(args, {"folder": args.out, "files": done}, f"{len(done)} files in {args.out}\n")
     return 0

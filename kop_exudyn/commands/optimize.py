@@ -5,6 +5,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from .output import add_json, report
 from .values import design_selection, not_negative, part_counts, positive
 
 HELP = "find one kit of parts for several designs"
@@ -40,6 +41,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--redeployments", type=not_negative, metavar="N",
                         help="how often the designs are then opened from their assembly and the second stage goes on "
                         "from where they end, so that they open into their shape by themselves (default: 0)")
+    add_json(parser, "print JSON for other programs: the paths of page, result and kit, and how every design fits")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -60,7 +62,11 @@ def run(args: argparse.Namespace) -> int:
                           settings=study.job_settings(designs, args.jobs or usable_cores()), overwrite=args.overwrite,
                           progress=not args.quiet)
     failed = [design.name for n, design in enumerate(result.designs) if "failed" in result.summary("assigned", n)]
-    sys.stdout.write(f"{args.out / 'index.html'}\n")
+    page = args.out / "index.html"
+    report(args, {
+        "page": page, "result": args.out / "result.json", "kit": args.out / "kit.json",
+        "designs": [{"name": design.name, **result.summary("assigned", n)} for n, design in enumerate(result.designs)],
+    }, f"{page}\n")
     if failed:
         sys.stderr.write(f"kop: these designs can't be built from the kit: {', '.join(failed)}\n")
     return 1 if failed else 0

@@ -5,6 +5,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from .output import add_json
 from .values import gravity
 
 HELP = "deploy one design and say how well it fits its target"
@@ -24,8 +25,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
                         help="let the rods' weight act: an acceleration down the z axis (default: 9.81, for lengths in "
                         "metres) or a vector X,Y,Z, in the design's units; instead of the design file's gravity. "
                         "Materials need a density")
-    parser.add_argument("--json", action="store_true", help="print JSON for other programs, joint positions included; "
-                        "of a simulation that fails, the design's name and the reason")
+    add_json(parser, "print JSON for other programs, joint positions included; of a simulation that fails, the design's "
+             "name and the reason")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -2,10 +2,10 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .output import add_json, report
 from .values import not_negative
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frames", type=not_negative, default=8, metavar="N",
                         help="states to solve for on the way to the opening (default: 8)")
     parser.add_argument("--overwrite", action="store_true", help="replace the page if it exists")
+    add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -38,7 +39,8 @@ def run(args: argparse.Namespace) -> int:
 
     check_output_file(args.out, overwrite=args.overwrite)
     page = _kit(args) if args.what.is_dir() else _design(args)
-    sys.stdout.write(f"{save_viewer(args.out, page, overwrite=args.overwrite)}\n")
+    path = save_viewer(args.out, page, overwrite=args.overwrite)
+    report(args, {"page": path}, f"{path}\n")
     return 0
 
 
