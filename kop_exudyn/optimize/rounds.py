@@ -2,8 +2,9 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import replace
-from typing import Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+from typing import Iterator, Sequence
 
 import numpy as np
 
@@ -22,31 +23,44 @@ _MISLED = 0.1  # a design that ends above its prediction by this share of the pr
 _PATIENCE = 1.1  # the SQP has to show what a trial is worth, unless J is larger than before by this factor
 _FAR_OFF = 2.0  # times J
 _REPEATS = 4  # reassignments before an SQP
+_BOLD = 0.01  # of the elements get other parts in a leap, at least
+_BOLD_DAMPINGS = (*_DAMPINGS, 1e-6, 1e-7, 0.0)
+_AFTER_LEAP = 2  # rounds at most
 _WORTHWHILE = 0.97  # of J: another reassignment comes before the SQP while they lower it by this factor
 
 _Trial = tuple[StageResult, Reassignment, float]  # what came of a reassignment, and the damping of its model
 
 
-def in_rounds(stages: Stages, start: StageResult, fixed_kit: bool = False, first: int = 1) -> StageResult:
-    """Reassign and optimise in turns until neither gains, from a state in which every element is its part.
+def in_rounds(stages: Stages, start: StageResult, fixed_kit: bool = False, numbers: Iterator[int] | None = None
+              ) -> StageResult:
+    """Reassign and optimise in turns until neither gains, from a state in which every element is its part; then leap.
+
+    What the rounds end in is a local minimum, and there are many. A leap gives more elements other parts than the model
+    can be trusted with, so that J rises at first; of where the rounds lead from there the better one is kept (iterated
+    local search: Lourenço, Martin, Stützle 2003).
 
     fixed_kit : keep the parts (projection onto an existing kit), only the assignment changes
-    first : number of the first round
+    numbers : of the rounds, where this isn't the first call: every SQP has a name of its own
     """
-    settings, best, steps = stages.settings, start, start.steps
+    settings = stages.settings
     if settings.reassignments == 0:
-        return start if fixed_kit else stages.assigned(start, "assigned" if first == 1 else f"assigned-{first}")
-    for number in range(first, first + settings.reassignments):
-        result = _many_reassigned(stages, best, fixed_kit)
-        if result is best and (fixed_kit or number > first):
+        name = "assigned" if numbers is None else f"assigned-{next(numbers)}"
+        return start if fixed_kit else stages.assigned(start, name)
+    rounds = _Rounds(stages, fixed_kit, numbers or count(1), start.steps)
+    best = rounds.settled(start, settings.reassignments)
+    leaps = settings.leaps
+    while leaps > 0 and best.value is not None:
+        for trial in _bold_trials(stages, best, fixed_kit)[:leaps]:
+            leaps -= 1
+            landed = rounds.settled(rounds.landed(trial), _AFTER_LEAP)
+            log.info("a leap ends at J = %.5g, from %.5g", _value(landed), best.value)
+            if _value(landed) < best.value:
+                leaps = leaps if rounds.worthwhile(best, landed) else 0
+                best = landed
+                break
+        else:
             break
-        if not fixed_kit:
-            result = stages.assigned(result, f"assigned-{number}", settings.round_steps)
-        steps += result.steps if result is not best else 0
-        last, best = best, min((best, result), key=_value)
-        if np.isfinite(_value(last)) and _value(last) - _value(best) < settings.reassigned_tolerance * _value(last):
-            break
-    return replace(best, steps=steps, jumps=start.jumps)
+    return replace(rounds.polished(best), steps=rounds.steps, jumps=start.jumps)
 
 
 def that_open(stages: Stages, start: StageResult, fixed_kit: bool = False) -> StageResult:
@@ -58,7 +72,7 @@ def that_open(stages: Stages, start: StageResult, fixed_kit: bool = False) -> St
     """
     settings = stages.settings
     best, best_value = start, np.inf
-    result = start
+    result, numbers = start, count(2 + settings.reassignments + settings.leaps * (1 + _AFTER_LEAP))
     for number in range(settings.redeployments + 1):
         found = stages.redeployed(result)
         opened = stages.judged(replace(result, designs=found))
@@ -69,9 +83,55 @@ def that_open(stages: Stages, start: StageResult, fixed_kit: bool = False) -> St
         opened = stages.confirmed(opened)
         if opened.value is None:
             break
-        first = 1 + (number + 1) * max(settings.reassignments, 1)
-        result = in_rounds(stages, opened, fixed_kit, first)
+        result = in_rounds(stages, opened, fixed_kit, numbers)
     return replace(best, jumps=start.jumps)
+
+
+@dataclass
+class _Rounds:
+    """Rounds with numbers, and the steps of their SQPs (those of rounds that are undone included)."""
+
+    stages: Stages
+    fixed_kit: bool
+    numbers: Iterator[int]
+    steps: int
+
+    def settled(self, best: StageResult, rounds: int) -> StageResult:
+        """Reassigned and optimised in so many rounds at most, as long as they gain."""
+        for number in range(rounds):
+            result = _many_reassigned(self.stages, best, self.fixed_kit)
+            if result is best and (self.fixed_kit or number > 0):
+                break
+            result = self._optimised(result)
+            last, best = best, min((best, result), key=_value)
+            if not self.worthwhile(last, best):
+                break
+        return best
+
+    def worthwhile(self, last: StageResult, best: StageResult) -> bool:
+        """Whether J fell by so much that another round may gain as well."""
+        allowed = self.stages.settings.reassigned_tolerance
+        return not np.isfinite(_value(last)) or _value(last) - _value(best) >= allowed * _value(last)
+
+    def landed(self, trial: StageResult) -> StageResult:
+        """The parts brought to a new assignment, roughly: the elements get other parts next."""
+        return self._optimised(trial, (self.stages.settings.round_steps + 1) // 2)
+
+    def polished(self, best: StageResult) -> StageResult:
+        """The parts brought to the minimum, to the tolerance asked for."""
+        settings = self.stages.settings
+        result = self._optimised(best, settings.round_steps, settings.assigned_tolerance)
+        return min((best, result), key=_value)
+
+    def _optimised(self, result: StageResult, max_steps: int | None = None, tolerance: float | None = None
+                   ) -> StageResult:
+        if self.fixed_kit:
+            return result
+        settings = self.stages.settings
+        result = self.stages.assigned(result, f"assigned-{next(self.numbers)}", max_steps or settings.round_steps,
+                                      tolerance or settings.round_tolerance)
+        self.steps += result.steps
+        return result
 
 
 def _all_same(stages: Stages, led: StageResult, opened: StageResult) -> bool:
@@ -136,6 +196,21 @@ def _several(stages: Stages, best: StageResult, derivatives: Sequence[DesignDeri
         if len(found) == _TRIALS or trial is not None and _value(trial[0]) > _FAR_OFF * _value(best):
             break
     return found
+
+
+def _bold_trials(stages: Stages, best: StageResult, fixed_kit: bool) -> list[StageResult]:
+    """Some trials in which many elements change, however J takes it; the best one first."""
+    derivatives = stages.dataset.derivatives(best.designs, hessian=True)
+    fewest = max(2.0, _BOLD * sum(design.n_elements for design in stages.dataset.designs))
+    found: list[StageResult] = []
+    for damping in _BOLD_DAMPINGS:
+        trial = _trial(stages, best, derivatives, damping, (), fixed_kit)
+        if trial is not None and trial[1].changes >= fewest and trial[0].value is not None:
+            found.append(trial[0])
+        if len(found) == _TRIALS:
+            break
+    confirmed = [stages.confirmed(trial) for trial in sorted(found, key=_value)]
+    return [trial for trial in confirmed if trial.value is not None]
 
 
 def _trial(stages: Stages, best: StageResult, derivatives: Sequence[DesignDerivatives], damping: float,

@@ -16,10 +16,13 @@ class StageSettings:
     tight : largest rms distance of elements to their parts, relative to the kind's scale, at which raising w_c ends
     relaxed_steps, assigned_steps, round_steps : accepted SQP steps at most: for each w_c, for an assigned stage (or
         baseline) without reassignments, for each round of one with them
-    relaxed_tolerance, last_tolerance, assigned_tolerance : the rounds of the relaxed stage before the last, the last
-        one, and the assigned stage end when steps promise or gain less than this share of J
+    relaxed_tolerance, last_tolerance, round_tolerance, assigned_tolerance : the SQPs of the relaxed stage before the
+        last w_c, with the last one, those of rounds in the assigned stage, and its last one end when steps promise or
+        gain less than this share of J
     reassignments : rounds of the assigned stage in which elements get other parts (see reassign.py), at most; a round
         that gains less than `reassigned_tolerance` of J is the last
+    leaps : how often, after these rounds, many elements get other parts at once whatever J does, and two more rounds
+        from there; what is no better is undone, and a gain below `reassigned_tolerance` is the last, see `in_rounds`
     redeployments : how often, after the assigned stage, the designs are opened from their assembly instead of led from
         the relaxed ones, and the stage goes on from where they end, see `that_open` in rounds.py
     path_steps : steps of the watched path between the stages
@@ -39,9 +42,11 @@ class StageSettings:
     round_steps: int = 15
     relaxed_tolerance: float = 3e-3
     last_tolerance: float = 5e-4
+    round_tolerance: float = 2e-3
     assigned_tolerance: float = 1e-4
     reassignments: int = 4
     reassigned_tolerance: float = 2e-2
+    leaps: int = 3
     redeployments: int = 0
     path_steps: int = 10
     rescues: int = 2

@@ -90,10 +90,11 @@ class Stages:
         data = result.point.data
         return StageResult(list(evaluations), kit, data.assignment, steps, result.point.value, result.status)
 
-    def assigned(self, start: StageResult, name: str = "assigned", max_steps: int | None = None) -> StageResult:
+    def assigned(self, start: StageResult, name: str = "assigned", max_steps: int | None = None,
+                 tolerance: float | None = None) -> StageResult:
         """Minimise over the parts from a state in which every element is its part; designs that failed stay out.
 
-        max_steps : default: the settings' `assigned_steps`
+        max_steps, tolerance : default: the settings' `assigned_steps` and `assigned_tolerance`
         """
         members = [n for n, e in enumerate(start.designs) if isinstance(e, Evaluation)]
         if not members:
@@ -107,7 +108,7 @@ class Stages:
         evaluations = [start.designs[n] for n in members]
         point = problem.point(problem.variables(np.concatenate([e.q for e in evaluations])), evaluations)
         options = SQPOptions(hessian=self.settings.hessian, secant=True, max_steps=max_steps or self.settings.assigned_steps,
-                             decrease_tolerance=self.settings.assigned_tolerance)
+                             decrease_tolerance=tolerance or self.settings.assigned_tolerance)
         result = self._sqp(name, problem, point, options, None)
         designs = list(start.designs)
         for n, evaluation in zip(members, result.point.data.evaluations):

@@ -1,4 +1,4 @@
-"""Other parts for elements: never worse under the model, best for every single element, and better designs in the end."""
+"""Other parts for elements: never worse under the model, best for every single element, better designs in the end."""
 import copy
 from dataclasses import replace
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from kop_exudyn.kit.kinds import part_kind
+from kop_exudyn.optimize import rounds
 from kop_exudyn.optimize.constraints import on_elements
 from kop_exudyn.optimize.dataset import Dataset
 from kop_exudyn.optimize.job import JobSettings, run_job
@@ -113,19 +114,42 @@ def test_frozen_designs_and_fixed_kits_stay(stages, direct, derivatives):
 
 def test_rounds_only_improve(stages, direct):
     once = stages.assigned(direct)
-    rounds = in_rounds(stages, once)
-    assert rounds.value <= once.value
-    rounds = in_rounds(stages, direct)
-    assert rounds.value < 0.1 * direct.value
-    for evaluation in rounds.designs:
+    assert in_rounds(stages, once).value <= once.value
+    found = in_rounds(stages, direct)
+    assert found.value < 0.1 * direct.value
+    for evaluation in found.designs:
         assert evaluation.confirmations["deployed"].moved < 1e-8
         assert evaluation.equilibria["deployed"].stable
 
 
+def test_a_leap_is_kept_if_it_ends_lower_and_undone_otherwise(stages, direct, monkeypatch):
+    low, high = sorted([in_rounds(leaping(stages, 0), direct), stages.assigned(direct)], key=lambda result: result.value)
+    assert low.value < 0.9 * high.value
+    monkeypatch.setattr(rounds, "_many_reassigned", lambda stages, best, fixed_kit: best)  # rounds stay where they are
+    monkeypatch.setattr(rounds, "_bold_trials", lambda stages, best, fixed_kit: [low] if best.value > low.value else [])
+    kept = in_rounds(leaping(stages, 3), high)
+    assert kept.value <= low.value and kept.assignment.changes(low.assignment) == 0
+    monkeypatch.setattr(rounds, "_bold_trials", lambda stages, best, fixed_kit: [direct])
+    undone = in_rounds(leaping(stages, 1), low)
+    assert undone.value <= low.value and undone.assignment.changes(low.assignment) == 0
+    assert undone.steps > in_rounds(leaping(stages, 0), low).steps  # the steps of leaps that are undone count, too
+
+
+def test_leaps_change_many_elements_at_once(stages, direct):
+    found = rounds._bold_trials(stages, direct, False)
+    values = [trial.value for trial in found]
+    assert values and values == sorted(values)
+    assert all(trial.assignment.changes(direct.assignment) >= 2 for trial in found)
+
+
+def leaping(stages, leaps):
+    return Stages(stages.dataset, PARTS, replace(stages.settings, leaps=leaps))
+
+
 def test_rounds_with_a_fixed_kit_change_the_assignment_only(stages, direct):
-    rounds = in_rounds(stages, direct, fixed_kit=True)
-    np.testing.assert_array_equal(rounds.kit.vector, direct.kit.vector)
-    assert rounds.value < direct.value and rounds.assignment.changes(direct.assignment) > 0
+    found = in_rounds(stages, direct, fixed_kit=True)
+    np.testing.assert_array_equal(found.kit.vector, direct.kit.vector)
+    assert found.value < direct.value and found.assignment.changes(direct.assignment) > 0
 
 
 def test_redeployment_improves_what_designs_open_into(stages, direct):
