@@ -90,9 +90,8 @@ def table_rows(classes: Mapping[str, Sequence[Found]]) -> list[dict[str, Any]]:
                 "worst joint, sampled %": size.get("sampled_worst_percent"),
                 "by lengths, %": 100 * sum(s for kind, s in found["shares"].items() if kind != "angular"),
                 "planned max %": found["planned_max_percent"],
-                "95 % of builds below, max %": float(np.quantile(deviations, 0.95)) if deviations else None,
-                "snapped": f"{size['snapped']} of {size['samples']}",
-                "no equilibrium": f"{size['failed']} of {size['samples']}"})
+                "95 % below %": float(np.quantile(deviations, 0.95)) if deviations else None,
+                "snapped": size["snapped"], "failed": size["failed"]})
     return rows
 
 
@@ -101,7 +100,7 @@ def drawn_spreads(classes: Mapping[str, Sequence[Found]], number: int = 3) -> li
     drawn = []
     for name, designs in classes.items():
         most = sorted(designs, key=lambda found: -np.linalg.norm(found["joints_percent"]))[:number]
-        drawn.append(DrawnDesign(name, [
-            DrawnState(found["design"], [np.array(chain) for chain in found["chains"]], np.array(found["joints"]),
+        drawn.append(DrawnDesign("", [
+            DrawnState(f"{name}: {found['design']}", [np.array(chain) for chain in found["chains"]], np.array(found["joints"]),
                        np.array(found["joints_percent"])) for found in most]))
     return drawn
