@@ -15,9 +15,10 @@ from ..kit.parts import Kit
 from ..optimize.stage_settings import StageSettings
 from .study import Study
 
-FULL = StageSettings(reassignments=2)  # rounds a kit: the sweep has ten, and each goes on from the one before
+FULL = StageSettings(reassignments=2, leaps=0)  # the sweep has ten kits, and each goes on from the one before
 SIZES = (2, 3, 4, 6, 8, 10, 12, 16, 20, 25)
-QUICK = StageSettings(schedule=(1e3, 1e5), relaxed_steps=2, round_steps=2, reassignments=1, path_steps=2, restarts=5)
+QUICK = StageSettings(schedule=(1e3, 1e5), relaxed_steps=2, round_steps=2, reassignments=1, leaps=0, path_steps=2,
+                      restarts=5)
 
 
 def size_tasks(files: Sequence[Path], sizes: Sequence[int], others: Mapping[str, int], stages: StageSettings,
