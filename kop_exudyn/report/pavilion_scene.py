@@ -69,10 +69,10 @@ def pavilion(result: KitResult, number: int, span: float, clearance: float = 0.0
     base = np.array([*(0.5 * (low + high)[:2]), low[2] - clearance / scale])
     rods, joints = scale * (rods - base), scale * (joints - base)
     breadth = scale * _breadth(scene, plain)
-    on_rods = cKDTree(rods).query(joints)[0] < breadth  # joints of umbrellas are their cells' centres
+    away, nearest = cKDTree(rods).query(joints)  # joints of umbrella meshes are the centres of their cells
     bodies = [Body(rods, mesh.faces, colours[mesh.chains[mesh.faces[:, 0]]])]
-    bodies += [_balls(joints[on_rods], 0.62 * breadth)] if on_rods.any() else []
-    bodies += _masts(joints) if clearance else []
+    bodies += [_balls(joints[away < breadth], 0.62 * breadth)] if (away < breadth).any() else []
+    bodies += _masts(rods[nearest]) if clearance else []
     return Pavilion(design.name, bodies, np.ptp(rods[:, :2], axis=0), float(rods[:, 2].max()), float(scale),
                     design.n_elements, len({(piece.kind, piece.part) for piece in pieces.pieces}),
                     outcome.fit.max_percent)
