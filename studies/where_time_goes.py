@@ -57,8 +57,9 @@ def main() -> None:
     report = study.report(finding)
     report.figure("steps", draw_costs(steps, TITLES),
                   "Below: wall seconds of every accepted step by phase. Above: equilibria solved for it, "
-                  f"{sum(len(design.roles) for design in designs)} for every point tried. A dashed line: the weight of the projection energy was "
-                  "raised, or elements got other parts.", alt="Seconds by phase of every accepted step in both stages")
+                  f"{sum(len(design.roles) for design in designs)} for every point tried. A dashed line: the weight of "
+                  "the projection energy was raised, or elements got other parts.",
+                  alt="Seconds by phase of every accepted step in both stages")
     report.table("phases", rows, "The whole run, and the median of an accepted step. Equilibria are assembly, "
                  "factorisation and the rest of Newton's method.")
     report.save({"finding": finding, "phases": rows, "medians": typical, "equilibria": outcome.equilibria},
