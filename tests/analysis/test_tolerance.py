@@ -88,3 +88,14 @@ def test_robustness_is_plain_and_tells_agreement_and_failures(built):
     assert large["predicted_rms_percent"] == pytest.approx(30 * small["predicted_rms_percent"])
     assert len(found["joints_percent"]) == len(design.joints)
     assert robustness(design, evaluation, Tolerance(5.0, 0.0), (1,), 2)["sizes"][0]["failed"] == 2
+
+
+def test_samples_that_snapped_are_counted_and_not_compared_with_the_prediction(built, monkeypatch):
+    design, evaluation = built
+    tolerance = relative_tolerance(design, 1e-4, 1e-4)
+    (kept,) = robustness(design, evaluation, tolerance, (1,), 2)["sizes"]
+    monkeypatch.setattr("kop_exudyn.analysis.tolerance.snapped", lambda *arguments: True)
+    (lost,) = robustness(design, evaluation, tolerance, (1,), 2)["sizes"]
+    assert kept["snapped"] == 0 and lost["snapped"] == 2
+    assert "linear_error" in kept and "linear_error" not in lost
+    assert lost["sampled_rms_percent"] == kept["sampled_rms_percent"]

@@ -35,15 +35,17 @@ def run(out, monkeypatch):
 
 
 def test_direct_vs_relaxed(run):
-    rows = run("direct_vs_relaxed")["designs"]
-    assert {row["class"] for row in rows} == {"C-shells", "grids", "umbrella meshes"}
+    data = run("direct_vs_relaxed")
+    rows = data["designs"]
+    assert {row["class"] for row in rows} == {"C-shells", "grids", "umbrella meshes"} == set(data["times"]["kits_s"])
+    assert 0 < sum(data["times"]["kits_s"].values()) < data["times"]["wall_s"]
     for row in rows:
         assert row["failed"] == "–" and row["assigned max %"] < row["direct max %"]
 
 
 def test_robustness(run):
     data = run("robustness")
-    assert len(data["designs"]) == 3
+    assert len(data["designs"]) == 3 and all(row["snapped"] == row["failed"] == 0 for row in data["designs"])
     for small, large in zip(data["missed"]["0.1"], data["missed"]["1"]):
         assert small < 0.1 and small < large
 
