@@ -157,7 +157,7 @@ def _best_trial(stages: Stages, best: StageResult, fixed_kit: bool) -> StageResu
     """The best of several reassignments, None where none is worth an SQP (with a fixed kit: none is better)."""
     if best.value is None:  # a design failed: there is no model of it
         return None
-    derivatives = stages.dataset.derivatives(best.designs, hessian=True)
+    derivatives = stages.dataset.derivatives(best.evaluations, hessian=True)
     trials = [_each_its_own(stages, best, derivatives)]
     if not fixed_kit:
         trials += _together(stages, best, derivatives)
@@ -200,7 +200,7 @@ def _several(stages: Stages, best: StageResult, derivatives: Sequence[DesignDeri
 
 def _bold_trials(stages: Stages, best: StageResult, fixed_kit: bool) -> list[StageResult]:
     """Some trials in which many elements change, however J takes it; the best one first."""
-    derivatives = stages.dataset.derivatives(best.designs, hessian=True)
+    derivatives = stages.dataset.derivatives(best.evaluations, hessian=True)
     fewest = max(2.0, _BOLD * sum(design.n_elements for design in stages.dataset.designs))
     found: list[StageResult] = []
     for damping in _BOLD_DAMPINGS:
@@ -221,7 +221,8 @@ def _trial(stages: Stages, best: StageResult, derivatives: Sequence[DesignDeriva
     found = reassign(stages.assigned_problem(best, range(len(best.designs))), model, frozen, fixed_kit)
     if found is None:
         return None
-    trial = stages.built_from(found.kit, found.assignment, best.designs, found.free)
+    path_steps = (stages.settings.path_steps + 1) // 2  # nobody looks for snaps here, and J tells what came of them
+    trial = stages.built_from(found.kit, found.assignment, best.evaluations, found.free, path_steps)
     log.info("other parts for %d elements (damping %g%s): J = %.5g, predicted %.5g", found.changes, damping,
              ", same kit" if fixed_kit else "", _value(trial), best.value + found.predicted.sum())
     return trial, found, damping
@@ -240,5 +241,5 @@ def _misled(stages: Stages, best: StageResult, trial: StageResult, found: Reassi
     """The designs that the model was wrong about: those that ended far above what it promised."""
     allowed = _MISLED * abs(found.predicted.sum())
     weights = stages.dataset.design_weights
-    return [n for n, (old, new) in enumerate(zip(best.designs, trial.designs))
+    return [n for n, (old, new) in enumerate(zip(best.evaluations, trial.designs))
             if isinstance(new, SimulationFailure) or weights[n] * (new.value - old.value) > found.predicted[n] + allowed]

@@ -68,6 +68,16 @@ class StageResult:
     status: str = ""
     jumps: list[Jump] = field(default_factory=list)
 
+    @property
+    def evaluations(self) -> list[Evaluation]:
+        """Those of all designs, where none failed. Raises the SimulationFailure of one that did."""
+        found = []
+        for outcome in self.designs:
+            if isinstance(outcome, SimulationFailure):
+                raise outcome
+            found.append(outcome)
+        return found
+
 
 def find_jump(design: Any, start: Evaluation, path: Sequence[Evaluation], diagonal: float) -> Jump | None:
     """The largest snap on a path of equal parameter steps, or None: joints that move far more in one step."""

@@ -51,9 +51,8 @@ class Stages:
 
     def __init__(self, dataset: Dataset, parts: Mapping[str, int], settings: StageSettings = StageSettings(),
                  store: Store | None = None, observer: Observer | None = None):
-        if settings.schedule is None:
-            weights = dataset.weights
-            settings = replace(settings, schedule=tuple(k * (weights.fit or weights.energy) for k in (0.1, 1, 10, 100)))
+        weights = dataset.weights
+        self.schedule = settings.schedule or tuple(k * (weights.fit or weights.energy) for k in (0.1, 1.0, 10.0, 100.0))
         self.dataset, self.parts, self.settings = dataset, dict(parts), settings
         self.store, self.observer = store or NoStore(), observer or (lambda event: None)
         self.q0 = dataset.parameters
@@ -80,8 +79,8 @@ class Stages:
                 name: str = "relaxed") -> StageResult:
         """Minimise over all elements, w_c raised until the clusters are tight; from the inputs or given evaluations."""
         settings, evaluations = self.settings, list(start or self.inputs())
-        steps, q, result = 0, np.concatenate([e.q for e in evaluations]), None
-        for weight in settings.schedule:
+        steps, q = 0, np.concatenate([e.q for e in evaluations])
+        for weight in self.schedule:
             result, problem = self._relax(f"{name}-{weight:g}", weight, q, evaluations, kit, fixed_kit)
             q, evaluations, kit = result.x, result.point.data.evaluations, result.point.data.kit
             steps += result.steps
@@ -105,7 +104,7 @@ class Stages:
         except InputError as error:
             log.warning("%s: the elements' constraints can't be met by these parts: %s", name, error)
             return replace(start, status="the constraints can't be met by these parts", jumps=[])
-        evaluations = [start.designs[n] for n in members]
+        evaluations = [e for e in start.designs if isinstance(e, Evaluation)]
         point = problem.point(problem.variables(np.concatenate([e.q for e in evaluations])), evaluations)
         options = SQPOptions(hessian=self.settings.hessian, secant=True, max_steps=max_steps or self.settings.assigned_steps,
                              decrease_tolerance=tolerance or self.settings.assigned_tolerance)
@@ -126,12 +125,13 @@ class Stages:
                                restrict(start.assignment, self.dataset, members), self.settings.bounds, constraints)
 
     def built_from(self, kit: Kit, assignment: Assignment, start: Sequence[Evaluation],
-                   free: np.ndarray | None = None) -> StageResult:
+                   free: np.ndarray | None = None, path_steps: int | None = None) -> StageResult:
         """All designs followed from evaluations to the parts of another kit or assignment; not confirmed yet.
 
         free : (k,) new values of the parameters of no element; default: they stay
+        path_steps : default: the settings'
         """
-        designs, jumps = self._to_parts(start, kit, assignment, free)
+        designs, jumps = self._to_parts(start, kit, assignment, free, path_steps)
         return self._result(designs, kit, assignment, jumps=jumps)
 
     def judged(self, result: StageResult) -> StageResult:
@@ -164,7 +164,7 @@ class Stages:
         settings = self.settings
         attempts = settings.rescues + (0 if fixed_kit else settings.growth)
         for attempt in range(attempts + 1):
-            designs, jumps = self._to_parts(relaxed.designs, relaxed.kit, relaxed.assignment)
+            designs, jumps = self._to_parts(relaxed.evaluations, relaxed.kit, relaxed.assignment)
             failed = [d for d in designs if isinstance(d, SimulationFailure)]
             for jump in jumps:
                 log.warning("%s snaps at %.0f %% of the way to its parts (%.1f %% of its size)", jump.design,
@@ -179,17 +179,17 @@ class Stages:
 
     def _rescued(self, relaxed: StageResult, attempt: int, jumps: list[Jump], fixed_kit: bool) -> StageResult:
         """The relaxed stage again from its end: with w_c raised, later with one more part of every kind."""
-        settings, kit, q = self.settings, relaxed.kit, np.concatenate([e.q for e in relaxed.designs])
+        settings, kit, q = self.settings, relaxed.kit, np.concatenate([e.q for e in relaxed.evaluations])
         if attempt < settings.rescues:
-            weight = settings.schedule[-1] * 10 ** (attempt + 1)
+            weight = self.schedule[-1] * 10 ** (attempt + 1)
             log.warning("raising w_c to %g", weight)
         else:
-            weight = settings.schedule[-1]
+            weight = self.schedule[-1]
             sizes = {kind: count + 1 for kind, count in kit.sizes.items()}
             log.warning("one more part of every kind: %s", sizes)
             kit = cluster(self.dataset.groups, q, sizes, bounds=settings.bounds, restarts=settings.restarts,
                           seed=settings.seed).kit
-        result, _ = self._relax(f"rescue-{attempt + 1}", weight, q, relaxed.designs, kit, fixed_kit)
+        result, _ = self._relax(f"rescue-{attempt + 1}", weight, q, relaxed.evaluations, kit, fixed_kit)
         data = result.point.data
         return StageResult(list(data.evaluations), data.kit, data.assignment, relaxed.steps + result.steps,
                            result.point.value, result.status, relaxed.jumps + jumps)
@@ -201,7 +201,7 @@ class Stages:
         problem = RelaxedProblem(self.dataset, self.projection.with_weight(weight), kit, settings.bounds,
                                  settings.constraints, fixed_kit)
         options = SQPOptions(hessian=settings.hessian, max_steps=settings.relaxed_steps,
-                             decrease_tolerance=settings.last_tolerance if weight >= settings.schedule[-1]
+                             decrease_tolerance=settings.last_tolerance if weight >= self.schedule[-1]
                              else settings.relaxed_tolerance)
         return self._sqp(name, problem, problem.point(q, list(evaluations), kit), options, weight), problem
 
@@ -243,12 +243,12 @@ class Stages:
         return q
 
     def _to_parts(self, start: Sequence[Evaluation], kit: Kit, assignment: Assignment, free: np.ndarray | None = None,
-                  ) -> tuple[list[Evaluation | SimulationFailure], list[Jump]]:
+                  path_steps: int | None = None) -> tuple[list[Evaluation | SimulationFailure], list[Jump]]:
         """Follow all designs to their parts; one that fails on the way is deployed there from scratch instead."""
         if free is None:
             free = np.concatenate([e.q for e in start])[self.dataset.free]
         q = self._realised(kit, assignment, free)
-        outcomes = self.dataset.follow(q, start, self.settings.path_steps)
+        outcomes = self.dataset.follow(q, start, path_steps or self.settings.path_steps)
         designs: list[Evaluation | SimulationFailure] = []
         jumps = []
         for n, path in enumerate(outcomes):
@@ -270,7 +270,8 @@ class Stages:
 
     def _value(self, designs: Sequence[Evaluation | SimulationFailure]) -> float | None:
         """The objective, where no design failed."""
-        return self.dataset.value(designs) if all(isinstance(d, Evaluation) for d in designs) else None
+        found = [design for design in designs if isinstance(design, Evaluation)]
+        return self.dataset.value(found) if len(found) == len(designs) else None
 
 
 def _restored(problem: Any, saved: Mapping[str, np.ndarray]) -> tuple[SQPState, Point, list[str]]:
