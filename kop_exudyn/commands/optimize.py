@@ -4,6 +4,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import Any
 
 from .output import add_json, report
 from .values import design_selection, not_negative, part_counts, positive
@@ -38,6 +39,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=not_negative, metavar="N", help="of the clustering (default: 0)")
     parser.add_argument("--max-steps", type=positive, metavar="N",
                         help="accepted steps at most, in each round of either stage")
+    parser.add_argument("--leaps", type=not_negative, metavar="N",
+                        help="how often many elements get other parts at once, to leave a local minimum: more find "
+                        "better kits and take longer (default: 3)")
     parser.add_argument("--redeployments", type=not_negative, metavar="N",
                         help="how often the designs are then opened from their assembly and the second stage goes on "
                         "from where they end, so that they open into their shape by themselves (default: 0)")
@@ -72,10 +76,10 @@ def run(args: argparse.Namespace) -> int:
     return 1 if failed else 0
 
 
-def _given(args: argparse.Namespace) -> dict[str, int]:
+def _given(args: argparse.Namespace) -> dict[str, Any]:
     """The stages' settings that options give."""
     steps = dict.fromkeys(("relaxed_steps", "assigned_steps", "round_steps"), args.max_steps)
-    given = {"seed": args.seed, "redeployments": args.redeployments, **steps}
+    given = {"seed": args.seed, "leaps": args.leaps, "redeployments": args.redeployments, **steps}
     return {name: value for name, value in given.items() if value is not None}
 
 
