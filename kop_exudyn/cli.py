@@ -60,7 +60,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def make_parser() -> argparse.ArgumentParser:
     """The parser, with all subcommands."""
-    verbosity = argparse.ArgumentParser(add_help=False)
+    verbosity = _Parser(add_help=False)
     group = verbosity.add_mutually_exclusive_group()
     group.add_argument("-q", "--quiet", action="store_true", help="no progress, errors only")
     group.add_argument("-v", "--verbose", action="count", default=0, help="say what is being done; twice: every detail")

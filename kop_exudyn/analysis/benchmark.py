@@ -97,7 +97,7 @@ def three_ways(case: str, make: Callable[[int], tuple[Scene, np.ndarray, State |
         system, error, force = System(scene), None, None
         for way, options in ((MIXED, NewtonOptions()), (PLAIN, NewtonOptions(mixed=False))):
             timing = timed(lambda _: _attempt(system, q, start, options), runs)
-            outcome = {"iterations": str(timing.value), "error %": None}
+            outcome: Row = {"iterations": str(timing.value), "error %": None}
             if not isinstance(timing.value, SimulationFailure):
                 apart = np.linalg.norm(timing.value.state.positions[joints(n)] - exact, axis=1)
                 error = 100 * float(apart.max()) / size
@@ -114,7 +114,7 @@ def _exudyn(case: str, n: int, system: System, q: np.ndarray, start: State | Non
     """Exudyn's row; its elements are the same, so that where it converges it has the same error."""
     found = [solve_alone(system.scene, q, _EXUDYN_ITERATIONS, start=start,
                          residual=None if force is None else _SAME_FORCE * force) for _ in range(runs)]
-    times, converged = [f["seconds"] for f in found], isinstance(found[-1]["iterations"], int)
+    times, converged = [float(f["seconds"]) for f in found], isinstance(found[-1]["iterations"], int)
     return {"case": case, "elements a piece": n, "unknowns": system.n_unknowns, "way": EXUDYN,
             "iterations": found[-1]["iterations"], "seconds": median(times), "least": min(times), "most": max(times),
             "error %": error if converged else None}

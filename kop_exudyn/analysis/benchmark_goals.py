@@ -4,6 +4,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Mapping, Sequence
@@ -39,15 +40,15 @@ def profile(system: System, timing: Timing) -> str:
             f"{timing.value.iterations} iterations")
 
 
-def released(designs: Mapping[str, Design], runs: int) -> list[Row]:
+def released(designs: Mapping[str, Umbrella], runs: int) -> list[Row]:
     """Full deployments of the meshes of RELEASED, with the fewest elements an arm that the error allows."""
     rows = []
     for name, allowed in RELEASED.items():
         design = designs[name]
-        found = deployments(name, lambda n, d=design: _with_arms(d, n), (2, 3, 4), 8, 1)
+        found = deployments(name, partial(_with_arms, design), (2, 3, 4), 8, 1)
         row = next(row for row in found if row["error %"] <= _ALLOWED_ERROR or row is found[-1])
         arms = row["elements a piece"]
-        timing = timed(lambda own: own.deploy(), runs, lambda d=design, n=arms: _with_arms(d, n))
+        timing = timed(lambda own: own.deploy(), runs, partial(_with_arms, design, arms))
         note = f"{arms} elements an arm, error {row['error %']:.3f} %, {row['iterations']} iterations"
         rows.append(goal(f"full deployment of {name}", allowed, "s", timing.median, note))
     return rows + [warm_solve(designs["hemisphere_5t"], runs)]
@@ -78,8 +79,8 @@ def large_c_shell(data: Mapping[str, Any], runs: int) -> Row:
     along = np.linspace(-0.85, 0.85, 6 * _JOINTS)
     images = [np.sinh(line) for y in places for line in (along + 1j * y, y + 1j * along)]
     scale = 0.2 * (_JOINTS - 1) / 1.6  # spans of about 0.2
-    curves = [{"type": "spline", "points": scale * np.stack([w.real, w.imag], axis=1)} for w in images]
-    content = dict(data) | {"name": "large", "curves": [c | {"points": c["points"].tolist()} for c in curves]}
+    curves = [{"type": "spline", "points": (scale * np.stack([w.real, w.imag], axis=1)).tolist()} for w in images]
+    content = dict(data) | {"name": "large", "curves": curves}
 
     def prepared() -> Design:
         design = design_from_dict(content, "large")
@@ -116,6 +117,7 @@ def full_sensitivities(design: Design, runs: int) -> Row:
     def iteration(_: None) -> None:
         system.assemble(state, mixed=True)
         system.factorise()
+        assert system.constraint is not None
         system.solve(system.constraint)
         system.solve(system.gradient[: system.n_unknowns])
         system.predict_stress(free)

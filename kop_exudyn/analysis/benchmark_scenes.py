@@ -21,7 +21,7 @@ def cantilever(elements: int, load: float = 3.0) -> tuple[Scene, np.ndarray]:
     weight = load * float(stiffness[4:].min())
     builder = SceneBuilder()
     bodies = builder.bodies(np.linspace([0.0, 0, 0], [1, 0, 0], elements + 1))
-    builder.rod(builder.nodes(bodies), stiffness, length=1.0, weight=[0, 0, -weight])
+    builder.rod(builder.nodes(bodies).tolist(), stiffness, length=1.0, weight=[0, 0, -weight])
     builder.pin(0)
     return builder.build(), np.zeros(0)
 

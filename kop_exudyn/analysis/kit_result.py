@@ -71,9 +71,10 @@ class KitResult:
         {"failed": why} where that deployment (or the design) failed.
         """
         opened, kept = self.redeployed[number], self.stages["assigned"].designs[number]
-        for outcome in (opened, kept):
-            if isinstance(outcome, SimulationFailure):
-                return {"failed": str(outcome)}
+        if isinstance(opened, SimulationFailure):
+            return {"failed": str(opened)}
+        if isinstance(kept, SimulationFailure):
+            return {"failed": str(kept)}
         role = self.designs[number].fitted_role.name
         moved = distance(self.designs[number], opened, kept)
         energy = opened.equilibria[role].elastic_energy

@@ -176,15 +176,15 @@ def _loaded(design: Design, scene: Scene, unloaded: Equilibrium, case: LoadCase,
 
 def _rigid_weight(scene: Scene, unloaded: Equilibrium, density: float | None, gravity: np.ndarray) -> list[DeadForces]:
     """The weight of pieces that don't bend, which are of the stiffest material, at their middles."""
-    rigid = [chain for chain in scene.chains if not len(chain.elements) and chain.section is not None]
+    rigid = [(chain, chain.section) for chain in scene.chains if not len(chain.elements) and chain.section is not None]
     if not rigid:
         return []
     if density is None:
         raise InputError("self-weight needs the density of every material", field="material.density")
     x, arms = scene.node_poses(unloaded.state)[0], scene.node_arms(unloaded.state)[0]
-    mass = [density * chain.section.area * np.linalg.norm(x[chain.nodes[-1]] - x[chain.nodes[0]]) for chain in rigid]
-    return [DeadForces([scene.node_body[chain.nodes[0]] for chain in rigid], np.outer(mass, gravity),
-                       [arms[chain.nodes[[0, -1]]].mean(axis=0) for chain in rigid])]
+    mass = [density * section.area * np.linalg.norm(x[chain.nodes[-1]] - x[chain.nodes[0]]) for chain, section in rigid]
+    return [DeadForces([scene.node_body[chain.nodes[0]] for chain, _ in rigid], np.outer(mass, gravity),
+                       [arms[chain.nodes[[0, -1]]].mean(axis=0) for chain, _ in rigid])]
 
 
 def _total_force(scene: Scene, unloaded: Equilibrium) -> np.ndarray:

@@ -40,7 +40,7 @@ def project_design(design: Design, kit: Kit, factor: float, stages: StageSetting
         states = {"direct": direct, "relaxed": search.confirmed(relaxed), "built": built,
                   "reassigned": in_rounds(search, built, fixed_kit=True)}
         found = {name: _plain(dataset, state, direct.assignment) for name, state in states.items()}
-        found["relaxed"]["tightness"] = search.projection.tightness(relaxed.designs[0].q, kit, relaxed.assignment)
+        found["relaxed"]["tightness"] = search.projection.tightness(relaxed.evaluations[0].q, kit, relaxed.assignment)
         return {"weight": factor * design.fit_weight, "elements": design.n_elements, **found}
 
 

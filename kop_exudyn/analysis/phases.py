@@ -5,7 +5,7 @@ anything, in other runs. Works within one process: run with one job.
 """
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import wraps
@@ -42,7 +42,7 @@ PHASES: Mapping[str, Sequence[tuple[Any, str]]] = {
 class PhaseClock:
     """Counts seconds by phase, each moment for one phase; `calls` counts the calls of the wrapped functions."""
 
-    seconds: Counter = field(default_factory=Counter)
+    seconds: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     calls: Counter = field(default_factory=Counter)
     _stack: list[str] = field(default_factory=lambda: [REST])
     _since: float = 0.0

@@ -72,5 +72,6 @@ def _built(dataset: Dataset, q: np.ndarray, path_steps: int) -> list[dict[str, A
     paths = dataset.follow(q, start, path_steps)
     ends: dict[int, Evaluation] = {n: path[-1] for n, path in enumerate(paths) if not isinstance(path, SimulationFailure)}
     confirmed = dataset.confirm(ends)
-    return [summary_of(confirmed.get(n, path), design, reference)
-            for n, (path, design, reference) in enumerate(zip(paths, dataset.designs, dataset.references))]
+    outcomes = [path if isinstance(path, SimulationFailure) else confirmed[n] for n, path in enumerate(paths)]
+    return [summary_of(outcome, design, reference)
+            for outcome, design, reference in zip(outcomes, dataset.designs, dataset.references)]

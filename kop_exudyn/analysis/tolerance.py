@@ -182,7 +182,7 @@ def robustness(design: Design, evaluation: Evaluation, tolerance: Tolerance, fac
         predicted = predicted_spread(design, evaluation, scaled)
         samples = sample_spread(design, evaluation, scaled, number, seed)
         found = [sample for sample in samples if sample.displacements is not None]
-        entry = {"factor": factor, "predicted_rms_percent": predicted.rms_percent,
+        entry: dict[str, Any] = {"factor": factor, "predicted_rms_percent": predicted.rms_percent,
                  "predicted_worst_percent": predicted.worst_percent, "samples": number, "failed": number - len(found),
                  "snapped": sum(sample.snapped for sample in found)}
         if found:
@@ -191,7 +191,7 @@ def robustness(design: Design, evaluation: Evaluation, tolerance: Tolerance, fac
                       "max_percent": [sample.max_percent for sample in found]}
         kept = [sample for sample in found if not sample.snapped]
         if kept:
-            moved = np.stack([sample.displacements for sample in kept])
+            moved = np.stack([sample.displacements for sample in kept if sample.displacements is not None])
             missed = np.linalg.norm(moved - predicted_displacements(design, evaluation, kept))
             entry["linear_error"] = float(missed / np.linalg.norm(moved))
         sizes.append(entry)

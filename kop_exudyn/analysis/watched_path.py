@@ -38,10 +38,10 @@ class WatchedPath:
 def watch(dataset: Dataset, relaxed: StageResult, steps: int) -> list[WatchedPath | SimulationFailure]:
     """Follow every design of a relaxed result to its parts; one that fails on the way comes back as its failure."""
     q = relaxed.assignment.matrix(relaxed.kit) @ relaxed.kit.vector
-    q[dataset.free] = np.concatenate([e.q for e in relaxed.designs])[dataset.free]
-    paths = dataset.follow(q, relaxed.designs, steps)
+    q[dataset.free] = np.concatenate([e.q for e in relaxed.evaluations])[dataset.free]
+    paths = dataset.follow(q, relaxed.evaluations, steps)
     return [path if isinstance(path, SimulationFailure) else _watched(design, reference, start, path)
-            for design, reference, start, path in zip(dataset.designs, dataset.references, relaxed.designs, paths)]
+            for design, reference, start, path in zip(dataset.designs, dataset.references, relaxed.evaluations, paths)]
 
 
 def watch_one(design: Design, parts: dict[str, int], settings: StageSettings,

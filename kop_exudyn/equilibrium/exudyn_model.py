@@ -310,7 +310,7 @@ class ExudynModel:
             per_hinge = eq.torque / (self._force * self._length) / len(scene.actuated)
             for load, axis in self._torques:
                 mbs.SetLoadParameter(load, "loadVector", (per_hinge * axis).tolist())
-        if self._weights:
+        if self._weights and scene.weight is not None:
             share = 0.5 * lengths[:, None] * scene.weight / self._force
             force = np.zeros((layout.n_nodes, 3))
             np.add.at(force, layout.element_nodes[:, 0], share)

@@ -42,6 +42,7 @@ class Factorisation:
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """Solve for one right-hand side (n,) or for a few (n, k)."""
+        assert self._solver is not None
         if rhs.ndim == 1:
             return self._solver.solve(rhs)
         return np.stack([self._solver.solve(np.ascontiguousarray(column)) for column in rhs.T], axis=1)
@@ -50,6 +51,7 @@ class Factorisation:
         self, rhs: sp.csc_matrix, constraint: np.ndarray | None = None, column: np.ndarray | None = None
     ) -> np.ndarray:
         """Solve for many sparse right-hand sides (n, k), bordered by a constraint (n,) if its column is given too."""
+        assert self._factors is not None
         L, pivots, order = self._factors
         if self._panels is None:
             self._panels = panels_of(L.indptr, L.indices)

@@ -271,7 +271,7 @@ class _Run:
                 best.slope = scale * float(residual @ step)
             system.predict_stress(scale * step)
             self.state = self.state.moved(system.increment(scale * step))
-            self.torque += scale * change
+            self.torque += scale * float(change)
 
     def _headway(self, best: _Best, value: float, merit: float) -> bool:
         """Whether a state is an advance on the best one: a lower energy, or half of its residual.

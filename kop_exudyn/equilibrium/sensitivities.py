@@ -159,7 +159,7 @@ class Sensitivities:
             return False
         d, t = bordered_solve(self.system, self._border, probe)
         residual = self.system.multiply(d) - probe
-        if self._border is not None:
+        if self._border is not None and self.system.constraint is not None:
             residual = residual + self.system.constraint * t
         return bool(np.isfinite(residual).all() and np.abs(residual).max() <= _TRUSTED_RESIDUAL * size)
 
@@ -244,6 +244,7 @@ class Sensitivities:
 
 def _weight_gradient_per_length(scene: Scene, state: State) -> np.ndarray:
     """d/dL (E, 14) of the dead load's generalised forces on an element's unknowns."""
+    assert scene.weight is not None
     half = -0.5 * scene.weight
     arms, rates = scene.node_arms(state)
     out = np.zeros((len(scene.elements), 14))

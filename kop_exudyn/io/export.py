@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from pathlib import Path
 from typing import Iterable
 
@@ -96,17 +97,16 @@ def chain_colours(parts: PartsList, placed: PlacedPieces) -> np.ndarray:
 def _write_state(parts: PartsList, placed: PlacedPieces, equilibrium, path: Path, formats: list[str],
                  overwrite: bool) -> list[Path]:
     scene, done = placed.scene, []
-    solids = [suffix for suffix in formats if suffix in ("ply", "glb")]
-    mesh = sweep(scene, equilibrium.state) if solids else None
+    swept = cache(lambda: sweep(scene, equilibrium.state))  # for several formats, if for any
     colours = chain_colours(parts, placed)
     for suffix in formats:
         target = path.with_name(f"{path.name}.{suffix}")
         if suffix == "obj":
             done.append(write_obj(target, scene.polylines(equilibrium.state), overwrite=overwrite))
         elif suffix == "ply":
-            done.append(write_ply(target, mesh, colours[mesh.chains], overwrite=overwrite))
+            done.append(write_ply(target, swept(), colours[swept().chains], overwrite=overwrite))
         elif suffix == "glb":
-            done.append(write_glb(target, _solids(parts, placed, mesh, colours), overwrite=overwrite))
+            done.append(write_glb(target, _solids(parts, placed, swept(), colours), overwrite=overwrite))
         elif suffix == "vtu":
             fields = element_fields(scene, equilibrium, rod_strength(scene, equilibrium, materials_of(placed.design)))
             done.append(write_vtu(target, scene, equilibrium, fields, overwrite=overwrite))

@@ -70,8 +70,8 @@ def _elements(result: KitResult) -> Iterator[dict[str, Any]]:
     stages = [stage for stage in STAGES if stage in result.stages]
     for n, placed in enumerate(parts.designs):
         values = {"input": placed.design.parameters}
-        values |= {stage: result.stages[stage].designs[n].q for stage in stages
-                   if isinstance(result.stages[stage].designs[n], Evaluation)}
+        values |= {stage: outcome.q for stage in stages
+                   if isinstance(outcome := result.stages[stage].designs[n], Evaluation)}
         for piece in placed.pieces:
             row = {"design": placed.design.name, "element": piece.element, "kind": piece.kind,
                    "part": parts.label(piece), "variant": piece.variant}

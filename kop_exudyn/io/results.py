@@ -43,7 +43,7 @@ def save_states(path: str | Path, found: Mapping[tuple[str, str, str], Equilibri
 
     found : (design, stage, role) -> equilibrium
     """
-    arrays = {}
+    arrays: dict[str, np.ndarray] = {}
     for key, equilibrium in found.items():
         state = equilibrium.state
         values = {"positions": state.positions, "rotations": state.rotations, "angles": state.angles,
@@ -59,8 +59,9 @@ def load_states(path: str | Path) -> dict[tuple[str, str, str], dict[str, np.nda
     """
     found: dict[tuple[str, str, str], dict[str, np.ndarray]] = {}
     for name, array in load_arrays(path).items():
-        *key, field = name.split("/")
-        if len(key) != 3:
+        pieces = name.split("/")
+        if len(pieces) != 4:
             raise InputError("not a file of final states", source=path, field=name)
-        found.setdefault(tuple(key), {})[field] = array
+        design, stage, role, field = pieces
+        found.setdefault((design, stage, role), {})[field] = array
     return found

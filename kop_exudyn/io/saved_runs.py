@@ -18,6 +18,8 @@ from ..structures.base import Design, Role
 from .results import load_result, load_states
 
 _LAST = "assigned"
+Outcome = Evaluation | SimulationFailure
+
 _SAME_PLACE = 1e-6  # of the size: how near a saved state is to the equilibrium found from it
 
 
@@ -51,16 +53,20 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
     for stage in STAGES:
         outcomes = [_outcome(objective, stage, states, entry, q if stage == _LAST else None)
                     for objective, entry, q in zip(objectives, data["designs"], realised)]
-        if None not in outcomes:
-            result.stages[stage] = StageResult(outcomes, kit, assignment, data["steps"].get(stage, 0),
+        if (found := _all(outcomes)) is not None:
+            result.stages[stage] = StageResult(found, kit, assignment, data["steps"].get(stage, 0),
                                                data.get("objective", {}).get(stage),
                                                data.get("status", {}).get(stage, ""),
                                                _jumps(data, stage))
-    opened = [_opened(objective, states, entry, q)
-              for objective, entry, q in zip(objectives, data["designs"], realised)]
-    if None not in opened:
-        result.redeployed = opened
+    result.redeployed = _all([_opened(objective, states, entry, q)
+                              for objective, entry, q in zip(objectives, data["designs"], realised)]) or ()
     return result
+
+
+def _all(outcomes: Sequence[Outcome | None]) -> list[Outcome] | None:
+    """The outcomes, where there is one of every design."""
+    found = [outcome for outcome in outcomes if outcome is not None]
+    return found if len(found) == len(outcomes) else None
 
 
 def _weights(settings: Mapping[str, Any], designs: Sequence[Design]) -> Weights:
@@ -114,8 +120,8 @@ def _judged(objective: DesignObjective, stage: str, states: Mapping[tuple[str, s
             q: np.ndarray | None) -> Evaluation | None:
     """The objective at a stage's saved states."""
     design = objective.design
-    saved = {role.name: states.get((design.name, stage, role.name)) for role in design.roles}
-    if None in saved.values():
+    saved = _saved(design, stage, states)
+    if saved is None:
         return None
     q = next(iter(saved.values())).get("parameters", q)
     if q is None:
@@ -126,12 +132,18 @@ def _judged(objective: DesignObjective, stage: str, states: Mapping[tuple[str, s
 
 def _reference(design: Design, states: Mapping[tuple[str, str, str], Any]) -> Reference:
     """The input design's equilibria, from their saved states where these are there."""
-    saved = {role.name: states.get((design.name, INPUT, role.name)) for role in design.roles}
-    if None in saved.values():
+    saved = _saved(design, INPUT, states)
+    if saved is None:
         return reference_of(design)
     equilibria = {role.name: _equilibrium(design, role, INPUT, design.parameters, saved[role.name])
                   for role in design.roles}
     return Reference(design.target, equilibria[design.fitted_role.name].elastic_energy, equilibria)
+
+
+def _saved(design: Design, stage: str, states: Mapping[tuple[str, str, str], Any]) -> dict[str, Any] | None:
+    """The saved arrays of a design's states by role, where there are all of them."""
+    found = {role.name: states[key] for role in design.roles if (key := (design.name, stage, role.name)) in states}
+    return found if len(found) == len(design.roles) else None
 
 
 def _equilibrium(design: Design, role: Role, stage: str, q: np.ndarray, saved: Mapping[str, np.ndarray]) -> Equilibrium:

@@ -203,5 +203,5 @@ class _CornerPlates:
         holes = [Hole(side * at * direction, self.hole) for side, direction in zip((-1, 1), along) for at in self.bolts]
         height = min(0.3 * self.board.breadth, 0.3 * leg)
         text = Text(np.array([0.0, -0.5 * half]), height, label)
-        shapes = (Polyline(np.array(outline)), *holes, Polyline(axis, False, ENGRAVE), text)
+        shapes: tuple[Shape, ...] = (Polyline(np.array(outline)), *holes, Polyline(axis, False, ENGRAVE), text)
         return [Template(label, f"{np.degrees(angle):.2f} deg", count, shapes, self.board.thickness)]

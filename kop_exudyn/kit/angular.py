@@ -8,7 +8,7 @@ from .kinds import PartKind, Variants, register
 ANGULAR = register(PartKind(
     name="angular",
     parameter_names=("angle",),
-    variants={1: Variants(("as is", "flipped"), [[[1]], [[-1]]])},
+    variants={1: Variants.of(("as is", "flipped"), [[[1]], [[-1]]])},
     canonical=np.abs,
     lower=np.zeros(1),
     upper=np.full(1, np.pi),

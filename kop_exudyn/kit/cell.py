@@ -8,7 +8,7 @@ from .kinds import PartKind, Variants, register
 CELL = register(PartKind(
     name="cell",
     parameter_names=("top", "bottom"),
-    variants={2: Variants(("as is", "mirrored"), [[[1, 0], [0, 1]], [[0, 1], [1, 0]]])},
+    variants={2: Variants.of(("as is", "mirrored"), [[[1, 0], [0, 1]], [[0, 1], [1, 0]]])},
     canonical=lambda parts: np.sort(parts, axis=1),
     lower=np.zeros(2),
     upper=np.full(2, np.inf),

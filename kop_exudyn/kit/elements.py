@@ -76,8 +76,7 @@ class KindElements:
     def costs(self, parts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Squared distance (n, m) of each element to each part in its best variant, and that variant (n, m)."""
         squared = [np.sum(block.variants.residuals(block.values, parts) ** 2, axis=3) for block in self.blocks]
-        return tuple(np.concatenate([pick(s) for s in squared])
-                     for pick in (lambda s: s.min(axis=2), lambda s: s.argmin(axis=2)))
+        return np.concatenate([s.min(axis=2) for s in squared]), np.concatenate([s.argmin(axis=2) for s in squared])
 
     def energy(self, parts: np.ndarray, labels: Labels) -> float:
         """Mean of half the squared relative distances, plus the parts' penalty; dimensionless."""

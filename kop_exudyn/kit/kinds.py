@@ -8,7 +8,7 @@ then every q in [V_v p, (V_v + W_v) p] is realised, and the distance is that to 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Callable, Mapping
+from typing import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -29,6 +29,11 @@ class Variants:
     names: tuple[str, ...]
     matrices: np.ndarray
     reach: np.ndarray | None = None
+
+    @classmethod
+    def of(cls, names: tuple[str, ...], matrices: Sequence, reach: Sequence | None = None) -> Variants:
+        """The same from nested lists."""
+        return cls(names, np.array(matrices, float), None if reach is None else np.array(reach, float))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "matrices", np.asarray(self.matrices, dtype=float))

@@ -9,9 +9,9 @@ LINEAR = register(PartKind(
     name="linear",
     parameter_names=("l1", "l2"),
     variants={
-        2: Variants(("as is", "mirrored"), [[[1, 0], [0, 1]], [[0, 1], [1, 0]]]),
+        2: Variants.of(("as is", "mirrored"), [[[1, 0], [0, 1]], [[0, 1], [1, 0]]]),
         # The element at a rod's end has a corner on one side of its joint only: it uses either side of a part.
-        1: Variants(("side 1", "side 2"), [[[1, 0]], [[0, 1]]]),
+        1: Variants.of(("side 1", "side 2"), [[[1, 0]], [[0, 1]]]),
     },
     canonical=lambda parts: np.sort(parts, axis=1),
     lower=np.zeros(2),

@@ -59,7 +59,8 @@ class Kit:
     def bounds(self, bounds: Mapping[str, tuple] | None = None) -> tuple[np.ndarray, np.ndarray]:
         """(n_p,), (n_p,): bounds of `vector`, natural ones narrowed by the user's (kind -> lower, upper)."""
         pairs = [(part_kind(name).bounds(bounds), len(parts)) for name, parts in self.parts.items()]
-        return tuple(np.concatenate([np.tile(pair[side], m) for pair, m in pairs]) for side in (0, 1))
+        lower, upper = (np.concatenate([np.tile(pair[side], m) for pair, m in pairs]) for side in (0, 1))
+        return lower, upper
 
     def to_dict(self) -> dict[str, list]:
         """Plain lists for JSON: kind -> [[...], ...], or [...] for kinds of one parameter."""
@@ -192,10 +193,10 @@ class Assignment:
             rows.append(np.broadcast_to(group.indices[:, :, None], block.shape).ravel())
             columns.append(np.broadcast_to((first[:, None] + np.arange(k_p))[:, None, :], block.shape).ravel())
             values.append(block.ravel())
-        rows, columns, values = (np.concatenate(a) if a else np.empty(0) for a in (rows, columns, values))
-        used = values != 0
+        entries, i, j = (np.concatenate(a) if a else np.empty(0) for a in (values, rows, columns))
+        used = entries != 0
         shape = (self.n_q, len(kit.vector))
-        return sp.csr_array((values[used], (rows[used].astype(int), columns[used].astype(int))), shape=shape)
+        return sp.csr_array((entries[used], (i[used].astype(int), j[used].astype(int))), shape=shape)
 
 
 def _within(numbers: np.ndarray, count: int) -> bool:

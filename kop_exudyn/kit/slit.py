@@ -21,8 +21,8 @@ SLIT = register(PartKind(
     name="slit",
     parameter_names=("l1", "l2", "slit"),
     variants={
-        2: Variants(("as is", "mirrored"), [[_SIDE_1, _SIDE_2], [_SIDE_2, _SIDE_1]], [[_SLIT, _SLIT]] * 2),
-        1: Variants(("side 1", "side 2"), [[_SIDE_1], [_SIDE_2]], [[_SLIT]] * 2),
+        2: Variants.of(("as is", "mirrored"), [[_SIDE_1, _SIDE_2], [_SIDE_2, _SIDE_1]], [[_SLIT, _SLIT]] * 2),
+        1: Variants.of(("side 1", "side 2"), [[_SIDE_1], [_SIDE_2]], [[_SLIT]] * 2),
     },
     canonical=_sorted_sides,
     lower=np.zeros(3),

@@ -115,8 +115,8 @@ def convexify(hessian: sp.csc_matrix) -> sp.csc_matrix:
             columns.append(np.tile(members, members.size))
             values.append(fixed.ravel())
     old = kept[label[result.row]]
-    rows, columns = np.concatenate([result.row[old], *rows]), np.concatenate([result.col[old], *columns])
-    return sp.csc_matrix((np.concatenate([result.data[old], *values]), (rows, columns)), shape=hessian.shape)
+    places = np.concatenate([result.row[old], *rows]), np.concatenate([result.col[old], *columns])
+    return sp.csc_matrix((np.concatenate([result.data[old], *values]), places), shape=hessian.shape)
 
 
 def _positive(block: np.ndarray) -> np.ndarray | None:

@@ -87,6 +87,12 @@ class DesignDerivatives:
     evaluation: Evaluation
     seconds: Mapping[str, float]
 
+    @property
+    def model(self) -> np.ndarray:
+        """The Hessian, which must have been asked for."""
+        assert self.hessian is not None
+        return self.hessian
+
 
 class DesignObjective:
     """F of one design, with the solver workspaces and Exudyn models that it needs, each made at first use."""
@@ -158,7 +164,7 @@ class DesignObjective:
 
     def follow(self, q: np.ndarray, previous: Evaluation, steps: int) -> list[Evaluation]:
         """Evaluations along the straight path from a previous one to q, in equal steps, each started from the last."""
-        path = []
+        path: list[Evaluation] = []
         for t in np.linspace(0, 1, steps + 1)[1:]:
             at = q if t == 1 else previous.q + t * (q - previous.q)
             try:

@@ -49,7 +49,7 @@ class DesignPool:
     def __init__(self, designs: Sequence[Design], jobs: int = 1):
         self.designs, self.jobs = list(designs), max(1, min(jobs, len(designs)))
         self.references: list[Reference] = []
-        self._parallel = None
+        self._parallel: Any = None  # joblib's Parallel, which is untyped
         if self.jobs == 1:
             _initialise(self.designs)
 

@@ -70,7 +70,7 @@ class RelaxedProblem:
         weights = self.dataset.design_weights
         own = np.concatenate([w * d.gradient for w, d in zip(weights, designs)])
         gradient = own + self.projection.gradient(point.x, data.kit, data.assignment)
-        hessian = sp.block_diag([w * d.hessian for w, d in zip(weights, designs)], format="csc")
+        hessian = sp.block_diag([w * d.model for w, d in zip(weights, designs)], format="csc")
         quadratic = self.projection.hessian(point.x, data.kit, data.assignment)
         if self.fixed_kit:
             return Derivatives(gradient, sp.csc_matrix(hessian + sp.csc_matrix(quadratic.qq)))
@@ -141,7 +141,7 @@ class AssignedProblem:
                                          self.dataset.offsets[1:]):
             rows = self.matrix[start:end]
             gradient += weight * (rows.T @ d.gradient)
-            hessian += weight * (rows.T @ (rows.T @ d.hessian.T).T)
+            hessian += weight * (rows.T @ (rows.T @ d.model.T).T)
         unused = np.flatnonzero(np.abs(hessian).sum(axis=1) == 0)
         hessian[unused, unused] = np.abs(hessian.diagonal()).mean()  # parts that nothing uses stay where they are
         return Derivatives(gradient, sp.csc_matrix(hessian))

@@ -117,7 +117,7 @@ class QPSolver:
         nothing = Residuals(np.nan, np.nan, np.nan)
         inverse = factorise_positive(qp.H, qp.border)
         if inverse is None and is_indefinite(qp.H, qp.border):  # OSQP would only print so, and only at set-up
-            return RawSolution(*start, "indefinite", 0), nothing, "direct"
+            return RawSolution(start[0], start[1], start[2], "indefinite", 0), nothing, "direct"
         direct = solve_direct(qp, inverse) if inverse is not None and self.options.direct else None
         attempts = [("direct", lambda: direct)] if direct is not None else []
         attempts += [

@@ -172,8 +172,8 @@ class OsqpBackend:
     def _load(self, upper, g, rows, low, high, limited) -> None:
         """Set up for a new pattern, else update; the penalty as at the start."""
         pattern = (upper.indptr, upper.indices, rows.indptr, rows.indices, limited)
-        known = self._solver is not None and len(self._pattern) == len(pattern)
-        if known and all(np.array_equal(a, b) for a, b in zip(self._pattern, pattern)):
+        known = len(self._pattern) == len(pattern)
+        if self._solver is not None and known and all(np.array_equal(a, b) for a, b in zip(self._pattern, pattern)):
             self._solver.update_settings(polishing=False)
             self._solver.update(q=g, l=low, u=high, Px=upper.data, Ax=rows.data)
             if self._rho_moved:  # costs a factorisation

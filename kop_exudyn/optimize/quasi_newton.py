@@ -43,6 +43,7 @@ class BlockBFGS:
         self._x, self._gradient = x.copy(), gradient.copy()
 
     def _update(self, k: int, step: np.ndarray, change: np.ndarray, scale: np.ndarray) -> None:
+        assert self._blocks is not None
         if not self._updated[k] and step @ change > 0:
             scaled = step / scale
             self._blocks[k] = np.diag(step @ change / (scaled @ scaled) / scale**2)

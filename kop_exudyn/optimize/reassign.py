@@ -48,12 +48,12 @@ class LocalModel:
         weights : of the designs;  scales : per design, sizes (nq,) of its parameters
         damping : mu, relative to the mean diagonal entry of the scaled Hessian
         """
-        scaled = np.concatenate([w * np.diagonal(d.hessian) * s**2 for d, w, s in zip(derivatives, weights, scales)])
+        scaled = np.concatenate([w * np.diagonal(d.model) * s**2 for d, w, s in zip(derivatives, weights, scales)])
         curvature = float(np.abs(scaled).mean())
         mu = damping * curvature
         return cls(tuple(d.evaluation.q for d in derivatives),
                    tuple(w * d.gradient for d, w in zip(derivatives, weights)),
-                   tuple(w * d.hessian + np.diag(mu / s**2) for d, w, s in zip(derivatives, weights, scales)),
+                   tuple(w * d.model + np.diag(mu / s**2) for d, w, s in zip(derivatives, weights, scales)),
                    1e-12 * curvature)
 
     def values(self, q: Sequence[np.ndarray]) -> np.ndarray:

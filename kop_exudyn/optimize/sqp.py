@@ -169,8 +169,8 @@ class _Run:
         if state is None:
             n, m = self.region.n, self.region.constraints.rows
             state = SQPState(self._feasible_start(x0), self.options.radius, y=np.zeros(m), z=np.zeros(n))
-        elif state.quasi_newton and (self.bfgs or self.secant):
-            (self.bfgs or self.secant).restore(state.quasi_newton)
+        elif state.quasi_newton and (learnt := self.bfgs or self.secant):
+            learnt.restore(state.quasi_newton)
         if start is not None and np.array_equal(start.x, state.x):
             return state, start
         point = self._timed("evaluate", self.problem.evaluate, state.x.copy(), None)
@@ -256,7 +256,7 @@ class _Run:
         return replace(
             state, x=trial.x.copy(), radius=_next_radius(radius, step, actual / step.predicted), step=state.step + 1,
             y=step.result.y, z=step.result.z[: self.region.n], history=(*state.history, record),
-            quasi_newton=(self.bfgs or self.secant).to_arrays() if self.bfgs or self.secant else {},
+            quasi_newton=learnt.to_arrays() if (learnt := self.bfgs or self.secant) else {},
         )
 
     def _stuck(self, state: SQPState, point: Point, trials: int, failures: int, last: str) -> SQPResult:

@@ -52,8 +52,8 @@ def draw_history(histories: Sequence[History]) -> Figure:
     """One panel a stage, logarithmic, on one scale; a line where w_c changes or a round begins says so."""
     names = list(dict.fromkeys(name for history in histories for step in history.steps for name in step.terms))
     colours = {name: CYCLE[k % len(CYCLE)] for k, name in enumerate(names)}
-    widths = [max(len(history.steps), 1) for history in histories]
-    widths = [max(width, 0.45 * max(widths)) for width in widths]  # a short stage stays readable
+    steps = [max(len(history.steps), 1) for history in histories]
+    widths = [max(width, 0.45 * max(steps)) for width in steps]  # a short stage stays readable
     with style():
         figure = Figure(figsize=(9.5, 3.7), layout="constrained")
         panels = figure.subplots(1, len(histories), sharey=True, width_ratios=widths, squeeze=False)[0]

@@ -60,9 +60,9 @@ def histories(result: KitResult) -> list[History]:
 def part_spaces(result: KitResult) -> list[PartSpace]:
     """Parts and elements by kind: the inputs', and those of the relaxed stage where all designs have them."""
     clouds = {"input elements": [design.parameters for design in result.designs]}
-    relaxed = result.stages["relaxed"].designs
-    if not any(isinstance(outcome, SimulationFailure) for outcome in relaxed):
-        clouds["relaxed elements"] = [outcome.q for outcome in relaxed]
+    relaxed = result.stages["relaxed"]
+    if not any(isinstance(outcome, SimulationFailure) for outcome in relaxed.designs):
+        clouds["relaxed elements"] = [outcome.q for outcome in relaxed.evaluations]
     groups = [group for design in result.designs for group in design.groups]
     owners = [n for n, design in enumerate(result.designs) for _ in design.groups]
     spaces = []

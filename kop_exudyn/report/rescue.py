@@ -30,7 +30,7 @@ def path_case(design: Path, parts: Mapping[str, int], weight: float, relaxed_ste
     subject = load_design(design)
     settings = StageSettings(schedule=(weight,), relaxed_steps=relaxed_steps, path_steps=path_steps, reassignments=0)
     path, relaxed = watch_one(subject, dict(parts), settings)
-    case: dict[str, Any] = {"parts": dict(parts), "weight": weight, "relaxed %": relaxed.designs[0].fit.max_percent}
+    case: dict[str, Any] = {"parts": dict(parts), "weight": weight, "relaxed %": relaxed.evaluations[0].fit.max_percent}
     if isinstance(path, SimulationFailure):
         return case | {"no equilibrium": str(path), "snapped": False}
     return case | {

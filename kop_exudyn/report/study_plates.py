@@ -11,8 +11,10 @@ import numpy as np
 from ..equilibrium.exudyn_model import ExudynModel
 from ..equilibrium.newton import refine
 from ..equilibrium.warm_up import warm_up
+from ..errors import InputError
 from ..io.designs import load_design
 from ..optimize.fitting import best_placement
+from ..structures.umbrella import Umbrella
 from ..structures.umbrella_bodies import PLATE_MODELS, RIGID, RODS
 
 
@@ -23,10 +25,11 @@ def compared_plates(file: Path, runs: int) -> dict[str, Any]:
     the bounding-box diagonal of those between plates of rods.
     """
     warm_up()
-    design = load_design(file)
+    design = _umbrella(file)
     rows, joints, energies = [], {}, {}
     for model in PLATE_MODELS:
-        own, times = design.with_plates(model), []
+        own = design.with_plates(model)
+        times: list[float] = []
         for _ in range(runs):
             own.systems
             begin = process_time()
@@ -45,9 +48,16 @@ def compared_plates(file: Path, runs: int) -> dict[str, Any]:
     return {"rows": rows}
 
 
+def _umbrella(file: Path) -> Umbrella:
+    design = load_design(file)
+    if not isinstance(design, Umbrella):
+        raise InputError("only umbrella meshes have plates", source=file, field="class", value=design.class_name)
+    return design
+
+
 def stiffened_plates(file: Path, factors: Sequence[float]) -> dict[str, Any]:
     """How near the joints between plates of ever stiffer rods come to those between rigid plates."""
-    design = load_design(file)
+    design = _umbrella(file)
     rigid = design.with_plates(RIGID)
     wanted = rigid.report_positions(rigid.deployed.state)
     rows = []

@@ -66,7 +66,7 @@ def viewer_parts(parts: PartsList) -> list[ViewerPart]:
     for kind, values in parts.kit.parts.items():
         for k, colour in enumerate(colours[kind]):
             found.append(ViewerPart(parts.labels[kind][k], kind, colour, _dimensions(part_kind(kind), values[k]),
-                                    parts.counts[kind][:, k]))
+                                    parts.counts[kind][:, k].tolist()))
     return found
 
 
@@ -166,9 +166,9 @@ class _Drawing:
             distances = np.sqrt(self.surface.closest(x).squared_distances)
             deviation = 100 * distances[nodes] / self.design.target.diagonal
         strength = design_strength(self.design, {role: equilibrium})[role]
-        known = strength.largest is not None
-        utilisation = _ring_values(scene, strength.utilisation) if known else None
-        note = f"stress: max {100 * strength.largest:.0f} % of its limit" if known else ""
+        largest = strength.largest
+        utilisation = None if largest is None else _ring_values(scene, strength.utilisation)
+        note = "" if largest is None else f"stress: max {100 * largest:.0f} % of its limit"
         return ViewerState(stage, role, x[nodes], R[nodes], joints, corners, deviation, utilisation,
                            equilibrium.opening, placed=placement is not None, note=note)
 

@@ -29,7 +29,8 @@ def bend_coefficients(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
     c_s = -(k_s + c) / large
     c_ss = -(k_ss + 2 * c_s) / large
     closed, derivatives = (c, c_s, c_ss), (series, series.deriv(), series.deriv(2))
-    return tuple(np.where(small, d(np.where(small, s, 0.0)), f) for d, f in zip(derivatives, closed))
+    value, first, second = (np.where(small, d(np.where(small, s, 0.0)), f) for d, f in zip(derivatives, closed))
+    return value, first, second
 
 
 def rotation_vectors(R: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ height along z.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Mapping
+from typing import Any, Callable, Mapping
 
 import numpy as np
 
@@ -134,7 +134,7 @@ def general(
 
 def section_from_dict(data: Mapping[str, Any]) -> Section:
     """The section that a design file describes: {"type": "rectangle" | "circle" | "general", ...}."""
-    makers = {"rectangle": rectangle, "circle": circle, "general": general}
+    makers: dict[str, Callable[..., Section]] = {"rectangle": rectangle, "circle": circle, "general": general}
     options = dict(data)
     kind = options.pop("type", None)
     if kind not in makers:

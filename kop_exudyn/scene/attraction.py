@@ -65,7 +65,9 @@ class Attraction:
     def energy(self, state: State) -> float:
         queries = self.queries(state)
         distance = np.sum((queries - self.targets) ** 2, axis=1)
+        to_surface: Any
         if self._has_surface and self.points is None:
+            assert self.surface is not None
             to_surface = self.surface.closest(queries).squared_distances
         else:
             to_surface = 0.0 if self.points is None else np.sum((queries - self.points) ** 2, axis=1)
@@ -84,6 +86,7 @@ class Attraction:
         energy = 0.5 * np.sum(self.target_weight * np.sum(away**2, axis=1))
         if self._has_surface:
             if self.points is None:
+                assert self.surface is not None
                 closest = self.surface.closest(queries)
                 points, stiffness = closest.points, _I3 - closest.derivative
             else:

@@ -33,7 +33,7 @@ class SceneBuilder:
         self._weights: list[np.ndarray] = []
         self._n_elements = 0
         self._chains: list[Chain] = []
-        self._driven: list[tuple[int, int, int, float]] = []
+        self._driven: list[tuple[int, int, int, float, float]] = []
         self._pins: list[tuple[int, int]] = []
         self._actuated: np.ndarray | None = None
         self._terms: list[Any] = []
@@ -96,10 +96,10 @@ class SceneBuilder:
         rest_strain : (k, 6) the whole rest strain measure instead, as h / length of the unstressed relative motion h
         weight : (3,) dead load per rest length
         """
-        nodes = np.asarray(nodes, int)
-        k = len(nodes) - 1
+        along = np.asarray(nodes, int)
+        k = len(along) - 1
         if k < 1:
-            raise InputError("a rod needs at least two nodes", field="rod.nodes", value=nodes.tolist())
+            raise InputError("a rod needs at least two nodes", field="rod.nodes", value=along.tolist())
         length = np.asarray(length, float)
         rest = np.zeros((k, 6))
         rest[:, 0] = 1.0
@@ -114,7 +114,7 @@ class SceneBuilder:
         self._weights.append(np.array(np.broadcast_to(0.0 if weight is None else weight, (k, 3)), float))
         elements = np.arange(self._n_elements, self._n_elements + k)
         self._n_elements += k
-        self._chains.append(Chain(nodes, elements, section))
+        self._chains.append(Chain(along, elements, section))
         return elements
 
     def rigid(self, nodes: Sequence[int], section: Section | None = None) -> None:

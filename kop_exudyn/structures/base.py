@@ -7,7 +7,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Callable, ClassVar, Iterator, Mapping, TYPE_CHECKING
+from typing import Any, Callable, ClassVar, Iterator, Mapping, TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -143,13 +143,14 @@ class Design(ABC):
 
 
 Reader = Callable[[Mapping[str, Any], str], Design]
+R = TypeVar("R", bound=Reader)
 _REGISTRY: dict[str, Reader] = {}
 
 
-def register(class_name: str) -> Callable[[Reader], Reader]:
+def register(class_name: str) -> Callable[[R], R]:
     """Decorator: the reader that makes a `Design` of a design file's content (a mapping) and its source name."""
 
-    def add(reader: Reader) -> Reader:
+    def add(reader: R) -> R:
         _REGISTRY[class_name] = reader
         return reader
 

@@ -45,7 +45,7 @@ def _isolines(surface: Surface, data: Mapping[str, Any]) -> list[Curve]:
     u, v = values
     of_u = [Polyline([[a, v[0]], [a, v[-1]]], field=f"network.u[{k}]") for k, a in enumerate(u)]
     of_v = [Polyline([[u[0], b], [u[-1], b]], field=f"network.v[{k}]") for k, b in enumerate(v)]
-    return of_u + of_v
+    return [*of_u, *of_v]
 
 
 def _geodesics(surface: Surface, data: Mapping[str, Any]) -> list[Curve]:

@@ -68,7 +68,8 @@ def variables(uv: np.ndarray) -> tuple[Jet, Jet]:
     """The jets of u and v themselves at points (n, 2)."""
     n = len(uv)
     zero = np.zeros((n, 2, 2))
-    return tuple(Jet(uv[:, k].astype(float), np.tile(np.eye(2)[k], (n, 1)), zero) for k in range(2))
+    u, v = (Jet(uv[:, k].astype(float), np.tile(np.eye(2)[k], (n, 1)), zero) for k in range(2))
+    return u, v
 
 
 def constant(value: float, like: Jet) -> Jet:

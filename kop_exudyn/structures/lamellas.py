@@ -97,14 +97,14 @@ def _spans(surface: Surface, strand: Strand) -> Spans:
     a, b = np.tan(slopes), np.tan(turns - slopes)
     shares = (b * (a + b) + 0.5 * _BLEND**2) / ((a + b) ** 2 + _BLEND**2)
     shares = np.clip(shares, _NEAREST, 1 - _NEAREST)
-    heights = corner_height(bases, shares, turns)
+    heights = np.asarray(corner_height(bases, shares, turns))
     before, after = np.hypot([shares * bases, (1 - shares) * bases], heights)
     return Spans(lengths[:, -1], before, after, turns, shares, heights)
 
 
 def _developed(surface: Surface, strand: Strand) -> tuple[np.ndarray, np.ndarray]:
     """Arc lengths and directions (n_spans, m) along the flat lamella between joints, both from 0."""
-    stations = np.linspace(*strand.spans.T, _SAMPLES, axis=-1)
+    stations = np.linspace(strand.spans[:, 0], strand.spans[:, 1], _SAMPLES, axis=-1)
     along = strand.curve.tangent(stations).reshape(-1, 2)
     local = surface.at(strand.curve.position(stations).reshape(-1, 2))
     speed = np.linalg.norm(local.push(along), axis=1)

@@ -49,7 +49,7 @@ def _directed_edges(network: CurveNetwork) -> tuple[np.ndarray, np.ndarray, np.n
     edges, angles, areas = [], [], []
     for strand in network.strands:
         for k, (span, ends) in enumerate(zip(strand.spans, strand.joints[strand.ends].tolist())):
-            x = strand.curve.position(np.linspace(*span, _SAMPLES + 1))
+            x = strand.curve.position(np.linspace(span[0], span[1], _SAMPLES + 1))
             x[0], x[-1] = network.joints[ends]
             area = 0.5 * np.sum(x[:-1, 0] * x[1:, 1] - x[1:, 0] * x[:-1, 1])
             edges += [ends, ends[::-1]]
@@ -70,7 +70,8 @@ def _next_edges(edges: np.ndarray, angles: np.ndarray) -> np.ndarray:
 
 def _ears(face: list[int], joints: np.ndarray) -> list[tuple[int, int, int]]:
     """Triangles of a polygon of joints, given counter-clockwise."""
-    rest, triangles = list(face), []
+    rest = list(face)
+    triangles: list[tuple[int, int, int]] = []
     while len(rest) > 3:
         ear = min((e for k in range(len(rest)) if (e := _ear(rest, k, joints))), default=None)
         if ear is None:
@@ -80,7 +81,7 @@ def _ears(face: list[int], joints: np.ndarray) -> list[tuple[int, int, int]]:
         del rest[k]
     if len(rest) < 3 or _area(*joints[rest]) <= 0:  # two curves that cross twice in a row enclose a lens
         return triangles
-    return [*triangles, tuple(rest)]
+    return [*triangles, (rest[0], rest[1], rest[2])]
 
 
 def _ear(polygon: list[int], k: int, joints: np.ndarray) -> tuple[float, int] | None:

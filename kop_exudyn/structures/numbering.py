@@ -58,10 +58,13 @@ class Numbering:
 def number_pieces(strands: Sequence[Strand], lengths: Sequence[np.ndarray],
                   corners: Sequence[np.ndarray]) -> Numbering:
     """Number the lengths (n_spans, 2) and corner angles (n_spans,) of straightened strands, and their free ends."""
-    values, is_length, numbers, first = [], [], [], 0
+    values: list[np.ndarray] = []
+    is_length: list[np.ndarray] = []
+    numbers: list[StrandNumbers] = []
+    first = 0
     for strand, halves, angles in zip(strands, lengths, corners):
         tips = [length for length in (strand.head, strand.tail) if length]
-        values += [halves.ravel(), tips, angles]
+        values += [halves.ravel(), np.array(tips), angles]
         at_tips = first + halves.size
         at_corners = at_tips + len(tips)
         is_length += [np.ones(at_corners - first, bool), np.zeros(len(angles), bool)]

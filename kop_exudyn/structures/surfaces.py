@@ -104,7 +104,7 @@ class Surface(ABC):
 
     def contains(self, uv: np.ndarray) -> np.ndarray:
         """(n,) whether parameters (n, 2) belong to the patch."""
-        return ((uv >= self.lower) & (uv <= self.upper)).all(axis=-1)
+        return np.all((uv >= self.lower) & (uv <= self.upper), axis=-1)
 
     def points(self, uv: np.ndarray) -> np.ndarray:
         """(n, 3) points at parameters (n, 2)."""
@@ -153,7 +153,9 @@ class AnalyticSurface(Surface):
         u, v = variables(np.asarray(uv, float))
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # singular points are told by `at`
             xyz = FAMILIES[self.name](u, v, **self.coefficients)
-        return tuple(np.stack([getattr(x, part) for x in xyz], axis=1) for part in ("value", "gradient", "hessian"))
+        x, first, second = (np.stack([getattr(jet, part) for jet in xyz], axis=1)
+                            for part in ("value", "gradient", "hessian"))
+        return x, first, second
 
 
 # -- families: (u, v, coefficients) -> x, y, z; in height fields u = x and v = y --------------------------------------

@@ -104,6 +104,7 @@ class Umbrella(Design):
     @cached_property
     def _pinned(self) -> Scene:
         """With the design's pins."""
+        assert self.pins is not None
         return self.pins.scene(self._model.scene, self.joints[self.pins.joints], self.mesh.lengths.size)
 
     @cached_property
@@ -212,7 +213,7 @@ class Umbrella(Design):
         return self._like(self.mesh, plate_model=plate_model, plates=plates)
 
     def _like(self, mesh: UmbrellaMesh, **changes: Any) -> Umbrella:
-        options = {"arms": self.arms, "plates": self.plates, "arm_elements": self.arm_elements,
+        options: dict[str, Any] = {"arms": self.arms, "plates": self.plates, "arm_elements": self.arm_elements,
                    "plate_elements": self.plate_elements, "plate_model": self.plate_model,
                    "least_length": self.least_length, "pins": self.pins, "deployment": self.deployment}
         design = Umbrella(self.name, mesh, **(options | changes))
@@ -226,7 +227,7 @@ def umbrella_from_dict(data: Mapping[str, Any], source: str = "design") -> Umbre
     try:
         base = BaseMesh(data["base"]["vertices"], data["base"]["faces"], bool(data["base"].get("flipped", False)))
         plates = Plates(**data.get("plates", {}))
-        materials = {key: material_from_dict(value) for key, value in data.get("materials", {}).items()}
+        materials: dict[str, Any] = {key: material_from_dict(value) for key, value in data.get("materials", {}).items()}
         target = _target(data["target"], base) if "target" in data else None
         pins = pins_from_dict(data["pins"], base, target) if "pins" in data else None
         return Umbrella(data["name"], umbrella_mesh(base, data["lengths"], plates, target), **materials, pins=pins,

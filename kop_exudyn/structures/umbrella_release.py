@@ -103,10 +103,10 @@ def _rods(read: _Fields, labels: np.ndarray, own: np.ndarray, n: int) -> tuple[U
     behind, offsets, seen = np.zeros((m, 2), bool), np.zeros((m, 2, 3)), np.zeros((m, 2), int)
     has = np.zeros((n, 2), bool)
     for side, letter in enumerate("AB"):
-        rods, shifts = read.listed(f"{letter}_segments", n), read.listed(f"midpoint_offsets_{letter}", n)
+        listed, shifts = read.listed(f"{letter}_segments", n), read.listed(f"midpoint_offsets_{letter}", n)
         for k in range(n):
             where = f"{letter}_segments[{k}]"
-            own_rods = read.values(rods[k], (None,), int, where, upper=m)
+            own_rods = read.values(listed[k], (None,), int, where, upper=m)
             shift = read.values(shifts[k], (len(own_rods), 3), float, f"midpoint_offsets_{letter}[{k}]")
             for rod, offset in zip(own_rods, shift):
                 ends = np.flatnonzero(joints[rod] == k)

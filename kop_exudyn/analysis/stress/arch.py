@@ -45,7 +45,7 @@ class Arch(Design):
         bodies = builder.bodies(positions, rotation_z(slopes))
         nodes = builder.nodes(bodies)
         for k in range(len(q)):
-            builder.rod(nodes[2 * k: 2 * k + 3], _SECTION, parameter=k)
+            builder.rod(nodes[2 * k: 2 * k + 3].tolist(), _SECTION, parameter=k)
         builder.pin(bodies[0], (0, 1, 2, 3, 4))
         builder.pin(bodies[-1], (0, 1, 2, 3))
         self.joints = bodies[2:-1:4]

@@ -21,7 +21,8 @@ _RODS = {"material": {"young": 2100.0, "poisson": 0.35},
 def corpus(folder: Any) -> dict[str, bytes]:
     """File name -> content. The name's first part says what reads it (see fuzz.READERS); `folder` is for scratch."""
     patch = BaseMesh(*parallelogram_patch(1, 1, 35.0))
-    kit = Kit({"linear": np.array([[1.0, 2.0], [1.5, 1.5]]), "angular": np.array([0.1, 0.2]), "cell": [[30.0, 31.0]]})
+    kit = Kit({"linear": np.array([[1.0, 2.0], [1.5, 1.5]]), "angular": np.array([0.1, 0.2]),
+               "cell": np.array([[30.0, 31.0]])})
     documents = {
         "design-c_shell.json": _c_shell("polyline"), "design-spline.json": _c_shell("spline"), "design-grid.json": _grid(),
         "design-umbrella.json": _umbrella(patch), "design-release.json": release_of(
@@ -84,8 +85,8 @@ def release_of(mesh: UmbrellaMesh) -> dict[str, Any]:
             if joints[end] not in mesh.crossings:
                 labels[joints[end]] = "PT" if rods.sides[rod] == 0 else "PB"
                 uid[joints[end]] = rods.cells[rod]
-    for side, label in enumerate(("OT", "OB")):
-        labels[mesh.centres[:, side]], uid[mesh.centres[:, side]] = label, np.arange(mesh.n_cells)
+    for centres, label in zip(mesh.centres.T, ("OT", "OB")):
+        labels[centres], uid[centres] = label, np.arange(mesh.n_cells)
     kinds = np.where(rods.arms, "TA", np.where(rods.sides == 0, "PT", "PB"))
     return {
         "bbox_diagonal": mesh.size, "vertices": (mesh.positions / mesh.size).tolist(), "v_labels": labels.tolist(),

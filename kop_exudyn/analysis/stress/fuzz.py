@@ -24,6 +24,7 @@ from .mutations import Tripwire, mutate
 
 def _checkpoint(path: Path) -> SQPState:
     arrays = CheckpointStore(path.parent).load(path.stem)
+    assert arrays is not None
     return SQPState.from_arrays({name[4:]: value for name, value in arrays.items() if name.startswith("sqp/")})
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...errors import SimulationFailure
 from ...optimize.job import JobOutcome, JobSettings, run_job
+from ...optimize.stage_results import StageEvent
 from ...structures.base import Design
 
 
@@ -52,7 +53,8 @@ def resumed_at(at: int, designs: Sequence[Design], parts: Mapping[str, int], set
 
     Returns the outcome and the events that the resumed run reported.
     """
-    store, events = FailingStore(at, KeyboardInterrupt(), after), []
+    store = FailingStore(at, KeyboardInterrupt(), after)
+    events: list[StageEvent] = []
     try:
         run_job(designs, parts, settings, store)
         return None

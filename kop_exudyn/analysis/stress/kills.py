@@ -17,7 +17,7 @@ from .arch import arch_data
 
 # `kop` itself, with the class of the stress tests known to it
 _PROGRAM = "import sys, kop_exudyn.analysis.stress.arch; from kop_exudyn.cli import main; sys.exit(main())"
-_TIMES = {"wall_s", "peak_memory_mb"}  # all in a result that may differ between two runs of one job
+_TIMES = {"wall_s", "peak_memory_mb", "seconds"}  # all in a result that may differ between two runs of one job
 
 
 def write_designs(folder: Path, count: int = 2, joints: int = 6) -> Path:

@@ -13,8 +13,9 @@ import numpy as np
 # What may stand where a number or a text is expected.
 _ODD_TOKENS = (b"NaN", b"Infinity", b"-Infinity", b"1e999", b"1e-320", b"-0", b"null", b"true", b'""', b"[]", b"{}",
                b"9" * 400, b"1e308", b"0.1.2", b"\\u0000", b"[" * 300, b'"\xff\xfe"', b"\xed\xa0\x80", b"-1", b"1e7")
-_ODD_VALUES = (None, True, False, 0, -1, 1, 2, 10**9, -(10**30), 1e-320, 1e300, -1e300, 0.5, "", "x", "\u0000", "../../x",
-               "a" * 5000, [], {}, [[]], [None], [0], [[0, 0]], {"type": "x"}, [1, [2, [3]]])
+_ODD_VALUES: tuple[Any, ...] = (
+    None, True, False, 0, -1, 1, 2, 10**9, -(10**30), 1e-320, 1e300, -1e300, 0.5, "", "x", "\u0000", "../../x",
+    "a" * 5000, [], {}, [[]], [None], [0], [[0, 0]], {"type": "x"}, [1, [2, [3]]])
 _SHORT = 40  # bytes: larger pieces of a file are moved seldom
 
 

@@ -135,7 +135,8 @@ def _frame(rng: np.random.Generator, seed: int, conditions: Conditions) -> Stres
     frame = _Frame(rng, conditions, points, exp_so3(rng.normal(size=(count, 3))))
     hinged = rng.random(count) < rng.choice([0.0, 0.3, 0.7])
     for a, b in edges:
-        frame.piece(a, b, tuple(bool(hinged[k] and rng.random() < 0.5) for k in (a, b)),
+        ends = bool(hinged[a] and rng.random() < 0.5), bool(hinged[b] and rng.random() < 0.5)
+        frame.piece(a, b, ends,
                     curvature=rng.uniform(0, 1.0) * rng.normal(size=3) if rng.random() < 0.3 else None)
     if rng.random() < 0.3:
         frame.load(rng, 10 ** rng.uniform(-1, 1))
@@ -164,17 +165,22 @@ _MAKERS = {"grid": _grid, "frame": _frame, "tree": _tree}
 
 def _neighbours(rng: np.random.Generator, points: np.ndarray, distance: np.ndarray) -> list[tuple[int, int]]:
     """A tree that reaches all points, and further short edges."""
-    reached, edges = [0], set()
+    reached = [0]
+    edges: set[tuple[int, int]] = set()
     while len(reached) < len(points):
         rest = [k for k in range(len(points)) if k not in reached]
         part = distance[np.ix_(reached, rest)]
         a, b = np.unravel_index(np.argmin(part), part.shape)
-        edges.add(tuple(sorted((reached[a], rest[b]))))
+        edges.add(_ordered(reached[a], rest[b]))
         reached.append(rest[b])
-    for a, row in enumerate(distance):
-        for b in np.argsort(row)[: int(rng.integers(1, 4))]:
-            edges.add(tuple(sorted((a, int(b)))))
+    for start, row in enumerate(distance):
+        for end in np.argsort(row)[: int(rng.integers(1, 4))]:
+            edges.add(_ordered(start, int(end)))
     return sorted(edges)
+
+
+def _ordered(a: int, b: int) -> tuple[int, int]:
+    return min(a, b), max(a, b)
 
 
 class _Frame:

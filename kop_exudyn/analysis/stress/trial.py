@@ -97,6 +97,7 @@ def _assembled(case: StressCase, eq: Equilibrium) -> tuple[System, float, float]
     residual, gap = system.gradient[: system.n_unknowns].copy(), 0.0
     if system.constraint is not None:
         residual += eq.torque * system.constraint
+        assert case.opening is not None
         gap = abs(float(eq.state.angles[case.scene.actuated].mean()) - case.opening)
     return system, float(np.abs(residual * system.force_weight).max()), gap
 
