@@ -12,17 +12,19 @@ HELP = "turn a drawing or a released umbrella mesh into a design file"
 DESCRIPTION = """Writes a design file from
 
   a drawing (.obj: its polylines; .dxf, with the extra [fab]: lines, polylines, arcs, circles, ellipses, splines):
-  a C-shell, its curves hinged wherever they cross. The drawing lies in a plane parallel to two axes. Pieces that
-  meet end to end without a sharp corner become one curve.
+  a C-shell, its curves hinged wherever they cross; or, with --as grid, a grid of lamellas over its curves on a surface,
+  drawn in plan. The drawing lies in a plane parallel to two axes. Pieces that meet end to end without a sharp corner
+  become one curve.
 
   an umbrella mesh in the format of its public release (.json or .json.gz): the same mesh, in millimetres. Such files
   can also be used directly wherever a design is expected."""
 EXAMPLES = """examples:
   kop import net.dxf --out net.json --opening 0.6 --section 0.03,0.004 --material 2.1e9,0.35
   kop import net.obj --as c_shell --out net.json --opening 35deg --section 30,4 --material 2100,0.35 --scale 1000
+  kop import plan.dxf --as grid --surface vault.obj --out vault.json --section 0.004,0.05 --material 1.1e10,0.3
   kop import hemisphere_5t.json.gz --out hemisphere.json --plates rigid"""
 
-_CLASSES = ("c_shell", "umbrella")
+_CLASSES = ("c_shell", "grid", "umbrella")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,11 +34,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--as", dest="kind", choices=_CLASSES,
                         help="class of the design (default: c_shell of drawings, umbrella of released meshes)")
     parser.add_argument("--overwrite", action="store_true", help="replace the file if it exists")
-    shell = parser.add_argument_group("C-shells", "opening, section and material are needed")
+    shell = parser.add_argument_group("drawings", "section and material are needed, of C-shells also the opening, of "
+                                      "grids also the surface")
     shell.add_argument("--opening", type=angle, metavar="ANGLE", help="change of the mean angle between curves from "
                        "assembly to deployment, in radians or as 35deg")
-    shell.add_argument("--section", type=number_pair, metavar="WIDTH,HEIGHT", help="of the rods: across the plane's "
-                       "normal and along it")
+    shell.add_argument("--surface", type=Path, metavar="MESH", help="mesh (.obj, .ply, .stl, COMPAS .json) that the "
+                       "grid lies on, above the drawing in the z direction")
+    shell.add_argument("--section", type=number_pair, metavar="WIDTH,HEIGHT", help="of the rods: across the normal of "
+                       "the plane or surface, and along it")
     shell.add_argument("--material", type=number_pair, metavar="YOUNG,POISSON", help="Young's modulus and Poisson's ratio")
     shell.add_argument("--density", type=positive_number, metavar="RHO", help="of the material, for its weight")
     shell.add_argument("--elastic-limit", type=positive_number, metavar="SIGMA", help="of the material, for its strength")
@@ -62,33 +67,66 @@ def run(args: argparse.Namespace) -> int:
     check_output_file(args.out, overwrite=args.overwrite)
     drawn = args.file.suffix.lower() in CURVE_READERS
     wanted = args.kind or ("c_shell" if drawn else "umbrella")
-    if drawn != (wanted == "c_shell"):
+    if drawn == (wanted == "umbrella"):
         raise InputError(f"can't be made of this file: expected "
                          f"{'a released mesh' if drawn else ' or '.join(CURVE_READERS)}", source=args.file, field="--as",
                          value=wanted)
-    data = _c_shell(args) if drawn else _umbrella(args)
+    data = {"c_shell": _c_shell, "grid": _grid, "umbrella": _umbrella}[wanted](args)
     write_json(args.out, data, overwrite=args.overwrite)
     report(args, {"design": args.out, "class": data["class"], "name": data["name"]}, f"{args.out}\n")
     return 0
 
 
 def _c_shell(args: argparse.Namespace) -> dict[str, Any]:
-    from ..errors import InputError
     from ..io.drawn_networks import c_shell_data, read_network
     from ..structures.base import design_from_dict
 
-    for name in ("opening", "section", "material"):
-        if getattr(args, name) is None:
-            raise InputError(f"a C-shell needs --{name}", source=args.file)
-    width, height = args.section
-    young, poisson = args.material
-    material = {"young": young, "poisson": poisson, "density": args.density, "elastic_limit": args.elastic_limit}
+    _require(args, "a C-shell", "opening", "section", "material")
     curves = read_network(args.file, args.layer, kind=args.curves, scale=args.scale, free_ends=args.free_ends)
-    data = c_shell_data(args.file.stem, curves, {"type": "rectangle", "width": width, "height": height},
-                        {name: value for name, value in material.items() if value is not None}, args.opening,
+    data = c_shell_data(args.file.stem, curves, _section(args), _material(args), args.opening,
                         free_ends=args.free_ends)
     design_from_dict(data, str(args.file))  # complains about what no C-shell can be made of
     return data
+
+
+def _grid(args: argparse.Namespace) -> dict[str, Any]:
+    from os.path import relpath
+
+    from ..errors import InputError
+    from ..io.drawn_networks import grid_data, read_network
+    from ..structures.base import design_from_dict
+
+    _require(args, "a grid", "surface", "section", "material")
+    if args.scale != 1.0 or args.free_ends:
+        raise InputError("not for grids", source=args.file, field="--free-ends" if args.free_ends else "--scale",
+                         value=None if args.free_ends else args.scale)
+    curves = read_network(args.file, args.layer, kind=args.curves)
+    surface = Path(relpath(args.surface, args.out.parent)).as_posix()
+    data = grid_data(args.file.stem, curves, _section(args), _material(args), surface)
+    try:
+        design_from_dict(data, str(args.out))  # the surface's path is relative to the design's file
+    except InputError as error:
+        raise InputError(error.message, source=args.file, field=error.field, value=error.value) from None
+    return data
+
+
+def _require(args: argparse.Namespace, what: str, *names: str) -> None:
+    from ..errors import InputError
+
+    for name in names:
+        if getattr(args, name) is None:
+            raise InputError(f"{what} needs --{name}", source=args.file)
+
+
+def _section(args: argparse.Namespace) -> dict[str, Any]:
+    width, height = args.section
+    return {"type": "rectangle", "width": width, "height": height}
+
+
+def _material(args: argparse.Namespace) -> dict[str, float]:
+    young, poisson = args.material
+    given = {"young": young, "poisson": poisson, "density": args.density, "elastic_limit": args.elastic_limit}
+    return {name: value for name, value in given.items() if value is not None}
 
 
 def _umbrella(args: argparse.Namespace) -> dict[str, Any]:

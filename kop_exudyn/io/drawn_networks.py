@@ -48,6 +48,19 @@ def c_shell_data(name: str, curves: Sequence[Mapping[str, Any]], section: Mappin
     return data
 
 
+def grid_data(name: str, curves: Sequence[Mapping[str, Any]], section: Mapping[str, Any],
+              material: Mapping[str, Any], surface: str) -> dict[str, Any]:
+    """The content of a grid's design file, see grid.schema.json: curves in plan on the mesh of a file.
+
+    surface : path of the mesh, relative to the design file
+    """
+    data = {"format": "kop_exudyn/design", "version": DESIGN_VERSION, "class": "grid", "name": name,
+            "material": dict(material), "section": dict(section), "surface": {"type": "mesh", "file": surface},
+            "network": {"type": "curves", "curves": list(curves)}}
+    check_schema(data, "grid")
+    return data
+
+
 def network_curves(curves: Sequence[DrawnCurve], kind: str = "spline", scale: float = 1.0
                    ) -> tuple[list[dict[str, Any]], list[str]]:
     """The field `curves` of a design file, and what each of them is called in the drawing.

@@ -229,3 +229,36 @@ class TestCommand:
         error = capsys.readouterr().err
         assert status == 2 and message in error and error.count("\n") == 1
         assert not (tmp_path / "out.json").exists()
+
+
+class TestGrids:
+    @pytest.fixture
+    def plan(self, tmp_path):
+        """A drawing above the vault of the repository's models, in plan."""
+        path = tmp_path / "plan.obj"
+        lines = [[(-0.9, y), (0.9, y)] for y in (-0.5, 0.0, 0.5)] + [[(x, -0.7), (x, 0.7)] for x in (-0.6, 0.0, 0.6)]
+        text = "".join(f"v {x} {y} 0\n" for line in lines for x, y in line)
+        path.write_text(text + "".join(f"l {2 * k + 1} {2 * k + 2}\n" for k in range(len(lines))))
+        return path
+
+    def test_curves_in_plan_on_a_mesh(self, plan, tmp_path, repository, capsys):
+        (tmp_path / "designs").mkdir()
+        out = tmp_path / "designs" / "vault.json"
+        surface = repository / "models" / "grids" / "vault.obj"
+        options = ("--as", "grid", "--surface", str(surface), "--section", "0.004,0.05", "--material", "1.1e10,0.3")
+        assert main(["import", str(plan), "--out", str(out), *options]) == 0
+        design = load_design(out)
+        assert design.class_name == "grid" and design.network.n_joints == 9
+        found = {tuple(x) for x in design.target.positions[:, :2].round(6).tolist()}
+        assert found == {(x, y) for x in (-0.6, 0.0, 0.6) for y in (-0.5, 0.0, 0.5)}
+
+    @pytest.mark.parametrize("options, message", [
+        ((), "a grid needs --surface"),
+        (("--surface", "no.obj"), "a grid needs --section"),
+        (("--surface", "no.obj", *OPTIONS[2:]), "surface.file = "),
+        (("--surface", "no.obj", *OPTIONS[2:], "--scale", "2"), "--scale = 2.0: not for grids"),
+    ])
+    def test_mistakes(self, options, message, plan, tmp_path, capsys):
+        assert main(["import", str(plan), "--as", "grid", "--out", str(tmp_path / "out.json"), *options]) == 2
+        error = capsys.readouterr().err
+        assert message in error and error.count("\n") == 1 and not (tmp_path / "out.json").exists()
