@@ -37,7 +37,7 @@ def test_bash_completes(capsys):
     assert completed("kop", "") >= set(NAMES)
     assert completed("kop", "opt") == {"optimize"}
     assert completed("kop", "import", "--sc") == {"--scale"}
-    assert completed("kop", "import", "x.dxf", "--as", "") == {"c_shell", "umbrella"}
+    assert completed("kop", "import", "x.dxf", "--as", "") == {"c_shell", "grid", "umbrella"}
 
 
 def test_json(capsys):
