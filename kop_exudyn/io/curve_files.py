@@ -11,6 +11,7 @@ from typing import Any, Callable, Iterator, Sequence
 import numpy as np
 
 from ..errors import InputError
+from .documents import LARGEST
 from .dxf import load_ezdxf
 from .files import read_bytes
 
@@ -90,9 +91,14 @@ def _vertex(values: Sequence[str], place: str) -> list[float]:
         point = [float(value) for value in values[:3]]
     except ValueError:
         point = []
-    if len(point) != 3 or not np.isfinite(point).all():
-        raise InputError("expected three coordinates of a vertex", field=place, value=" ".join(values))
+    if len(point) != 3 or not _usable(point):
+        raise InputError("expected three coordinates of a vertex, within 1e60", field=place, value=" ".join(values))
     return point
+
+
+def _usable(coordinates: Any) -> bool:
+    """Whether they are finite, and their powers as well."""
+    return bool((np.abs(coordinates) <= LARGEST).all())
 
 
 def _index(text: str, n_vertices: int, place: str) -> int:
@@ -112,11 +118,11 @@ def _dxf_curves(content: bytes, layers: Sequence[str]) -> Iterator[DrawnCurve]:
     from ezdxf import path as paths
 
     space = _dxf_document(ezdxf, content).modelspace()
-    known = {entity.dxf.layer for entity in space}
+    known = {_layer(entity) for entity in space}
     for layer in layers:
         if layer not in known:
             raise InputError(f"no such layer (there are {', '.join(sorted(known)) or 'none'})", field="layer", value=layer)
-    entities = [entity for entity in space if not layers or entity.dxf.layer in layers]
+    entities = [entity for entity in space if not layers or _layer(entity) in layers]
     left = Counter(entity.dxftype() for entity in entities if entity.dxftype() not in _DRAWN)
     if left:
         log.warning("left out what is no curve: %s", ", ".join(f"{n} {name}" for name, n in left.items()))
@@ -130,6 +136,11 @@ def _dxf_curves(content: bytes, layers: Sequence[str]) -> Iterator[DrawnCurve]:
         yield DrawnCurve(points[:len(points) - closed], closed, f"{entity.dxftype()} {entity.dxf.handle}")
 
 
+def _layer(entity: Any) -> str:
+    """Its layer; entities that only the drawing's program knows have none."""
+    return entity.dxf.layer if entity.dxf.is_supported("layer") else ""
+
+
 def _path_of(paths: Any, entity: Any) -> Any:
     """An entity as a path of lines and Bezier curves."""
     label = f"{entity.dxftype()} {entity.dxf.handle}"
@@ -138,8 +149,8 @@ def _path_of(paths: Any, entity: Any) -> Any:
     except Exception as error:  # meshes among the polylines, splines without knots, ...
         raise InputError(f"can't be read as a curve: {str(error)[:100]}", field=label) from None
     points = np.array([tuple(point) for point in path.control_vertices()]).reshape(-1, 3)
-    if len(points) < 2 or not np.isfinite(points).all():
-        raise InputError("is no curve: it has less than two points", field=label)
+    if len(points) < 2 or not _usable(points):
+        raise InputError("is no curve: expected two points or more, within 1e60", field=label)
     return path
 
 

@@ -10,7 +10,7 @@ from typing import Any, Mapping
 from ..errors import InputError
 
 _LONGEST = 160  # characters of a message that quotes what it found
-_LARGEST = 1e60
+LARGEST = 1e60  # of numbers, whose powers stay within double precision
 _PREFIX = "urn:kop_exudyn:"
 _TYPES = {"object": "an object", "array": "a list", "string": "a text", "number": "a number", "integer": "an integer",
           "boolean": "true or false", "null": "null"}
@@ -55,7 +55,7 @@ def check_range(data: Any, source: Any = None) -> None:
             waiting += [([*path, key], item) for key, item in value.items()]
         elif isinstance(value, list):
             waiting += [([*path, k], item) for k, item in enumerate(value)]
-        elif isinstance(value, (int, float)) and not -_LARGEST <= value <= _LARGEST:
+        elif isinstance(value, (int, float)) and not -LARGEST <= value <= LARGEST:
             raise InputError("is out of range", source=source, field=dotted(path), value=_shown(value))
 
 

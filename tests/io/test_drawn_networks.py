@@ -74,6 +74,7 @@ class TestObj:
     @pytest.mark.parametrize("text, message", [
         ("v 0 0 0\nf 1 1 1\n", "net.obj: contains no curves"),
         ("v 0 0\n", "line 1 = '0 0': expected three coordinates"),
+        ("v 0 0 1e99\n", "line 1 = '0 0 1e99': expected three coordinates of a vertex, within 1e60"),
         ("v 0 0 nan\n", "line 1 = '0 0 nan': expected three coordinates"),
         ("v 0 0 0\nv 1 1 1\n\nl 1 3\n", r"line 4 = 3: no such vertex \(2 are given before\)"),
         ("v 0 0 0\nv 1 1 1\nl 0 1\n", "line 3 = 0: no such vertex"),
@@ -128,6 +129,14 @@ class TestDxf:
         assert len(read_curves(path)) == 2 and len(read_curves(path, ["rods"])) == 1
         with pytest.raises(InputError, match=r"layer = 'rod': no such layer \(there are frame, rods\)"):
             read_curves(path, ["rod"])
+
+    def test_entities_of_other_programs_are_left_out(self, drawing, tmp_path):
+        document, space = drawing
+        space.add_line((0, 0), (1, 0))
+        path = saved(document, tmp_path / "net.dxf")
+        content = path.read_bytes().replace(b"ENTITIES\n", b"ENTITIES\n  0\nODD_THING\n  5\nFEFE\n", 1)
+        path.write_bytes(content)
+        assert b"ODD_THING" in content and len(read_curves(path)) == 1
 
     @pytest.mark.parametrize("content, message", [
         (b"", "can't be read as DXF|contains no curves"), (b"\x00\x01\x02" * 50, "can't be read as DXF|contains no curves"),
