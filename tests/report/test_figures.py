@@ -61,6 +61,14 @@ class TestDesigns:
         assert np.sum(depths[1:] ** 2) == pytest.approx(1)
         assert places[3, 1] > 0 and depths[3] < 0
 
+    def test_rows_of_different_states_have_their_titles_in_the_panels(self):
+        rows = [DrawnDesign("", [drawn("a", 1.0, 2.0), drawn("b", 1.0, 2.0)]),
+                DrawnDesign("", [drawn("c", 1.0, 2.0), drawn("d", 1.0, 2.0)])]
+        figure = draw_designs(rows, 1.5, "displacement")
+        for title, ax in zip("abcd", figure.axes):
+            assert title in [text.get_text() for text in ax.texts] and not ax.get_title()
+        assert "displacement, % of box diagonal" in [ax.get_ylabel() for ax in figure.axes]
+
     def test_flat_and_failed_designs_are_drawn(self):
         flat = DrawnDesign("flat", [drawn("rest", 0.0, 0.0)])
         nothing = DrawnDesign("none", [DrawnState("rest", failed="no")])
