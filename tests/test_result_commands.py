@@ -93,6 +93,19 @@ def test_export_writes_a_labelled_drawing_of_every_design(run, tmp_path, capsys)
     assert {path: path.read_bytes() for path in workshop.iterdir()} == before
 
 
+def test_sheets_holes_and_single_folders(run, tmp_path, capsys):
+    command = ["export", *map(str, run), "--unit", "m", "--out", str(tmp_path)]
+    assert main([*command, "--sheet", "200,100"]) == 2
+    assert "larger than a sheet's 170 x 56 mm" in capsys.readouterr().err and not list(tmp_path.iterdir())
+    assert main([*command, "--sheet", "0,100"]) == 2
+    assert main([*command, "--only", "workshop", "--sheet", "3000,700", "--joint-hole", "6.5"]) == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["workshop"]
+    sheet = (tmp_path / "workshop" / "cut_sheet_1.svg").read_text()
+    assert 'width="3000mm"' in sheet and 'r="3.2500"' in sheet
+    assert main([*command, "--only", "desk"]) == 0
+    assert (tmp_path / "desk" / "steps.csv").is_file()
+
+
 def test_exported_vtu_has_strains_stresses_and_utilisation(run, tmp_path):
     assert main(["export", *map(str, run), "--unit", "m", "--out", str(tmp_path / "files")]) == 0
     tree = ElementTree.parse(tmp_path / "files" / "desk" / "flat_assigned_deployed.vtu")
