@@ -64,7 +64,7 @@ def run_folder(case: KitCase, study: Study) -> Path:
 def kit_of(case: KitCase, folder: Path, jobs: int) -> KitResult:
     """The kit of a case: a finished run of the same job in its folder, or a new run, which goes on from checkpoints.
 
-    A run that was read back has no events. Raises InputError and SimulationFailure as `optimize_kit` does.
+    Raises InputError and SimulationFailure as `optimize_kit` does.
     """
     designs, files = load_designs(case.folder, case.number), case.files
     settings = JobSettings(stages=case.stages, jobs=jobs)
