@@ -50,12 +50,14 @@ def parametric_patch(surface: Callable[[np.ndarray, np.ndarray], Any], n: int = 
 
 
 def design_on_surface(name: str, base: BaseMesh, vertices: np.ndarray, faces: np.ndarray, *, plates: Plates = Plates(),
-                      least_growth: float = LEAST_GROWTH, turn: float = 0.0) -> dict[str, Any]:
+                      least_growth: float = LEAST_GROWTH, turn: float = 0.0, density: float | None = None
+                      ) -> dict[str, Any]:
     """The content of a design file: a base mesh laid on the middle of a surface.
 
     vertices (V, 3), faces (F, 3) : surface, disc-like; its scale matters: it decides how strongly the cells curve
     least_growth : of the cell that grows least; it fixes how large a part of the surface is covered
     turn : rad, of the base mesh on the surface
+    density : of arms and plates, tonnes / mm^3, for their weight
 
     Raises InputError where the surface can't be flattened or the base mesh reaches beyond it.
     """
@@ -75,13 +77,15 @@ def design_on_surface(name: str, base: BaseMesh, vertices: np.ndarray, faces: np
     middles = flat.lift(scale * points[base.faces].mean(axis=1))
     near = flat.around(scale * points)
     kept, where = np.unique(faces[near], return_inverse=True)
+    weighing = {} if density is None else {"density": density}
     return {
         "format": "kop_exudyn/design", "version": 1, "class": "umbrella", "name": name,
         "base": {"vertices": base.vertices.round(6).tolist(), "faces": base.faces.tolist(), "flipped": base.flipped},
         "lengths": np.repeat(lengths[:, None], 2, axis=1).round(4).tolist(),
         "plates": {"arm_position": plates.arm_position, "thickness": plates.thickness, "width": plates.width,
                    "spacing": plates.spacing},
-        "materials": {"arms": {"young": 1400.0, "poisson": 0.35}, "plates": {"young": 14000.0, "poisson": 0.35}},
+        "materials": {"arms": {"young": 1400.0, "poisson": 0.35, **weighing},
+                      "plates": {"young": 14000.0, "poisson": 0.35, **weighing}},
         "target": {"vertices": vertices[kept].round(3).tolist(), "faces": where.reshape(-1, 3).tolist(),
                    "crossings": crossings.round(3).tolist(), "plates": middles.round(3).tolist()},
     }

@@ -17,6 +17,7 @@ from kop_exudyn.structures.umbrella_layout import BaseMesh, Plates
 
 PLATES = Plates()
 EDGE = 30 + np.sqrt(3) * PLATES.thickness  # plates of 30 mm
+DENSITY = 9e-10  # tonnes / mm^3, polypropylene: weights in newtons with gravity in mm / s^2
 FOLDER = Path(__file__).resolve().parent
 
 
@@ -47,7 +48,7 @@ def make(name: str) -> dict[str, Any]:
     """The content of one design file."""
     base, height, size = DESIGNS[name]
     vertices, faces = height_field(height, size, 30)
-    return design_on_surface(name, base, vertices, faces, plates=PLATES)
+    return design_on_surface(name, base, vertices, faces, plates=PLATES, density=DENSITY)
 
 
 if __name__ == "__main__":

@@ -84,8 +84,6 @@ def test_a_c_shell_under_the_loads_of_its_file(c_shell_data):
 def test_umbrella_meshes_stand_on_their_pins_or_corners(repository, pins, supports):
     """Rigid plates have no elements, but weigh as much as bending ones."""
     data = json.loads((repository / "models" / "umbrellas" / "hill.json").read_text())
-    for material in data["materials"].values():
-        material["density"] = 9e-10
     found = []
     for model in ("rods", "rigid"):
         design = design_from_dict(data | {"plate_model": model} | ({"pins": pins} if pins else {}))

@@ -91,6 +91,7 @@ def test_models_are_what_the_script_writes(script, repository, name):
     assert np.allclose(written["lengths"], made["lengths"], atol=2e-3)
     assert np.allclose(written["target"]["crossings"], made["target"]["crossings"], atol=0.02)
     assert written["base"]["faces"] == made["base"]["faces"]
+    assert written["materials"] == made["materials"] and made["materials"]["arms"]["density"] == 9e-10
 
 
 @pytest.mark.parametrize("name", MODELS)
