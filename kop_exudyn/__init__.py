@@ -24,11 +24,17 @@ _PUBLIC = {
     "optimize.job": ("JobSettings", "run_job"),
     "optimize.objective": ("Weights",),
     "optimize.stages": ("StageSettings",),
+    "equilibrium.sensitivities": ("Sensitivities",),
     "analysis.kit_result": ("KitResult",),
+    "analysis.new_design": ("project_design",),
     "analysis.simulation": ("SimulationResult", "simulate"),
     "io.designs": ("load_design", "load_designs"),
+    "io.export": ("export_desk", "export_workshop"),
     "io.kits": ("load_kit", "save_kit"),
+    "io.pieces": ("parts_list_of",),
     "io.results": ("load_result",),
+    "io.saved_runs": ("load_run",),
+    "io.templates": ("CutOptions",),
     "report.kit_run": ("optimize_kit",),
 }
 _MODULE_OF = {name: module for module, names in _PUBLIC.items() for name in names}
