@@ -1,4 +1,4 @@
-"""``kop import``: a drawing of curves, or a released umbrella mesh, as a design file of our own."""
+"""``kop import``: a drawing of curves, a surface or a released umbrella mesh, as a design file of our own."""
 from __future__ import annotations
 
 import argparse
@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from .output import add_json, report
-from .values import angle, number_pair, positive_number
+from .values import angle, number_pair, patch, positive_number
 
-HELP = "turn a drawing or a released umbrella mesh into a design file"
+HELP = "turn a drawing, a surface or a released umbrella mesh into a design file"
 DESCRIPTION = """Writes a design file from
 
   a drawing (.obj: its polylines; .dxf, with the extra [fab]: lines, polylines, arcs, circles, ellipses, splines):
@@ -16,23 +16,27 @@ DESCRIPTION = """Writes a design file from
   drawn in plan. The drawing lies in a plane parallel to two axes. Pieces that meet end to end without a sharp corner
   become one curve.
 
+  a surface (with --patch; a mesh: .obj, .ply, .stl, or .json of COMPAS): an umbrella mesh in the shape of its middle,
+  in millimetres, the arms as long as the cells have to grow.
+
   an umbrella mesh in the format of its public release (.json or .json.gz): the same mesh, in millimetres. Such files
   can also be used directly wherever a design is expected."""
 EXAMPLES = """examples:
   kop import net.dxf --out net.json --opening 0.6 --section 0.03,0.004 --material 2.1e9,0.35
   kop import net.obj --as c_shell --out net.json --opening 35deg --section 30,4 --material 2100,0.35 --scale 1000
   kop import plan.dxf --as grid --surface vault.obj --out vault.json --section 0.004,0.05 --material 1.1e10,0.3
+  kop import dome.ply --as umbrella --patch hexagon,3 --out dome.json --scale 1000
   kop import hemisphere_5t.json.gz --out hemisphere.json --plates rigid"""
 
 _CLASSES = ("c_shell", "grid", "umbrella")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, metavar="FILE", help="drawing (.obj, .dxf) or released umbrella mesh (.json, "
-                        ".json.gz)")
+    parser.add_argument("file", type=Path, metavar="FILE", help="drawing (.obj, .dxf), surface (.obj, .ply, .stl, "
+                        ".json) or released umbrella mesh (.json, .json.gz)")
     parser.add_argument("--out", type=Path, required=True, metavar="DESIGN", help="design file to write (.json)")
     parser.add_argument("--as", dest="kind", choices=_CLASSES,
-                        help="class of the design (default: c_shell of drawings, umbrella of released meshes)")
+                        help="class of the design (default: c_shell of .obj and .dxf, umbrella of others)")
     parser.add_argument("--overwrite", action="store_true", help="replace the file if it exists")
     shell = parser.add_argument_group("drawings", "section and material are needed, of C-shells also the opening, of "
                                       "grids also the surface")
@@ -50,9 +54,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     shell.add_argument("--free-ends", action="store_true", help="keep the rods' ends beyond their last joint")
     shell.add_argument("--layer", action="append", default=[], metavar="NAME", help="of DXF files, the layer to read; "
                        "may be given several times (default: all)")
-    shell.add_argument("--scale", type=positive_number, default=1.0, metavar="S", help="multiply the drawing's "
-                       "coordinates by this, as 0.001 for millimetres to metres (default: 1)")
+    shell.add_argument("--scale", type=positive_number, default=1.0, metavar="S", help="multiply the coordinates of "
+                       "drawings and of umbrella meshes' surfaces by this, as 0.001 for millimetres to metres (default: 1)")
     umbrella = parser.add_argument_group("umbrella meshes")
+    umbrella.add_argument("--patch", type=patch, metavar="SHAPE,N", help="of a surface: the cells to lay on it, as "
+                          "hexagon,3 or triangle,6 or parallelogram,4,5 (cells along the edges)")
+    umbrella.add_argument("--plate-edge", type=positive_number, default=30.0, metavar="MM",
+                          help="of a surface: edge of the plates (default: 30)")
     umbrella.add_argument("--plates", choices=("rods", "rigid"), default="rods", help="model of the plates: rods that "
                           "bend, as released, or rigid bodies, with fewer unknowns (default: %(default)s)")
     add_json(parser)
@@ -66,11 +74,10 @@ def run(args: argparse.Namespace) -> int:
 
     check_output_file(args.out, overwrite=args.overwrite)
     drawn = args.file.suffix.lower() in CURVE_READERS
-    wanted = args.kind or ("c_shell" if drawn else "umbrella")
-    if drawn == (wanted == "umbrella"):
-        raise InputError(f"can't be made of this file: expected "
-                         f"{'a released mesh' if drawn else ' or '.join(CURVE_READERS)}", source=args.file, field="--as",
-                         value=wanted)
+    wanted = args.kind or ("c_shell" if drawn and args.patch is None else "umbrella")
+    if wanted != "umbrella" and not drawn:
+        raise InputError(f"can't be made of this file: expected {' or '.join(CURVE_READERS)}", source=args.file,
+                         field="--as", value=wanted)
     data = {"c_shell": _c_shell, "grid": _grid, "umbrella": _umbrella}[wanted](args)
     write_json(args.out, data, overwrite=args.overwrite)
     report(args, {"design": args.out, "class": data["class"], "name": data["name"]}, f"{args.out}\n")
@@ -135,8 +142,23 @@ def _umbrella(args: argparse.Namespace) -> dict[str, Any]:
     from ..structures.umbrella_import import import_release
     from ..structures.umbrella_release import is_release
 
+    if args.patch is not None:
+        return _umbrella_on_mesh(args)
+    if args.file.suffix.lower() not in (".json", ".gz"):
+        raise InputError("an umbrella mesh on a surface needs --patch", source=args.file)
     data = read_json(args.file)
     if not is_release(data):
-        raise InputError("isn't a released umbrella mesh", source=args.file)
+        raise InputError("isn't a released umbrella mesh; of a surface, give --patch", source=args.file)
     name = args.file.name.removesuffix(".gz").removesuffix(".json")
     return import_release(data, name, str(args.file), args.plates)
+
+
+def _umbrella_on_mesh(args: argparse.Namespace) -> dict[str, Any]:
+    from ..errors import InputError
+    from ..structures.umbrella_on_mesh import umbrella_on_mesh
+
+    try:
+        return umbrella_on_mesh(args.file.stem, args.file, args.patch, scale=args.scale, plate_edge=args.plate_edge,
+                                density=args.density, plate_model=args.plates)
+    except InputError as error:
+        raise error.at(args.file) from None

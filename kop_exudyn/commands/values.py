@@ -56,6 +56,14 @@ def number_pair(text: str) -> tuple[float, float]:
     return values[0], values[1]
 
 
+def patch(text: str) -> tuple[str, list[int]]:
+    """``parallelogram,4,5`` as ("parallelogram", [4, 5]); which shapes there are is checked later."""
+    shape, *counts = (piece.strip() for piece in text.split(","))
+    if not shape or not counts:
+        raise argparse.ArgumentTypeError(f"expected SHAPE,N or SHAPE,M,N, got {text!r}")
+    return shape, [_whole(count, 1, "the number of cells") for count in counts]
+
+
 def angle(text: str) -> float:
     """An angle in radians; ``35deg`` in degrees."""
     degrees = text.removesuffix("deg")

@@ -108,6 +108,14 @@ def load_mesh_surface(path: Path, chart: str = "plane", up: str = "z") -> MeshSu
     return MeshSurface(*read_mesh(path), chart, up)
 
 
+def is_disc(mesh: TriangleSurface) -> bool:
+    """Whether a mesh, all of whose vertices are in use, is in one piece with exactly one border and no handles."""
+    import igl
+
+    edges = len(np.unique(np.sort(mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0))
+    return len(igl.boundary_loop_all(mesh.faces)) == 1 and len(mesh.vertices) - edges + len(mesh.faces) == 1
+
+
 def _basis(knots: np.ndarray, n: int) -> list[BSpline]:
     """The n basis functions as one vector-valued spline, with its first two derivatives."""
     spline = BSpline(knots, np.eye(n), _DEGREE)
@@ -134,12 +142,10 @@ def _conformal(mesh: TriangleSurface) -> np.ndarray:
     """(V, 2) least-squares conformal map of a disc."""
     import igl
 
-    loops = igl.boundary_loop_all(mesh.faces)
-    edges = len(np.unique(np.sort(mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0))
-    if len(loops) != 1 or len(mesh.vertices) - edges + len(mesh.faces) != 1:
+    if not is_disc(mesh):
         raise InputError("a conformal chart needs a mesh in one piece with exactly one border", field="surface.chart",
                          value="conformal")
-    loop = np.array(loops[0])
+    loop = np.array(igl.boundary_loop_all(mesh.faces)[0])
     ends = loop[[0, int(np.argmax(np.linalg.norm(mesh.vertices[loop] - mesh.vertices[loop[0]], axis=1)))]]
     apart = float(np.linalg.norm(np.diff(mesh.vertices[ends], axis=0)))
     flat = np.asarray(igl.lscm(mesh.vertices, mesh.faces, ends, np.array([[0.0, 0.0], [apart, 0.0]]))[0])

@@ -223,7 +223,7 @@ class TestCommand:
     @pytest.mark.parametrize("options, message", [
         ((), "a C-shell needs --opening"),
         (OPTIONS[:2], "a C-shell needs --section"),
-        ((*OPTIONS, "--as", "umbrella"), "--as = 'umbrella': can't be made"),
+        ((*OPTIONS, "--as", "umbrella"), "an umbrella mesh on a surface needs --patch"),
         ((*OPTIONS, "--material", "1,0.7"), "material.poisson = 0.7: must be at most 0.5"),
         ((*OPTIONS, "--opening", "9"), "opening.angle = 9.0"),
         ((*OPTIONS, "--opening", "wide"), "expected an angle in radians, or as 35deg, got 'wide'"),
