@@ -8,14 +8,15 @@ the README shows.
 from __future__ import annotations
 
 import argparse
-import shutil
 from pathlib import Path
 
 from kop_exudyn.io.designs import load_designs, select_files
+from kop_exudyn.io.files import write_bytes
 from kop_exudyn.optimize.job import JobSettings
 from kop_exudyn.optimize.stage_settings import StageSettings
 from kop_exudyn.report.environment import usable_cores
 from kop_exudyn.report.kit_run import optimize_kit
+from kop_exudyn.report.style import with_palette
 
 ROOT = Path(__file__).resolve().parents[1]
 MODELS = ROOT / "models" / "conformals"
@@ -38,7 +39,8 @@ stages = StageSettings(relaxed_steps=2, assigned_steps=2, reassignments=0, path_
 # 3. All stages; results, figures and index.html go to the folder.
 result = optimize_kit(designs, parts, out=arguments.out, settings=JobSettings(stages=stages, jobs=arguments.jobs),
                       inputs=select_files(MODELS, number), resume=arguments.resume, overwrite=True, progress=True)
-shutil.copyfile(arguments.out / "designs.png", arguments.out / "picture.png")
+picture = with_palette((arguments.out / "designs.png").read_bytes(), 128)
+write_bytes(arguments.out / "picture.png", picture, overwrite=True)
 
 # 4. What came out: largest deviation of the joints from the target, in % of its bounding box.
 for n, design in enumerate(designs):

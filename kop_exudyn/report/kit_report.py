@@ -38,6 +38,7 @@ def _page(result: KitResult, figures: dict) -> Page:
     elements = sum(design.n_elements for design in result.designs)
     page = Page(f"One kit of parts for {len(result.designs)} designs",
                 f"{sizes} parts realise the {elements} elements of {', '.join(d.name for d in result.designs)}.")
+    page.links({"Turn the designs around in 3D": "viewer.html"})
     page.table(*summary_rows(result),
                "Distance of the joints from the target surface, in % of its bounding-box diagonal; elastic energy "
                "relative to the input design's. Input: the designs as given. Direct: every input element replaced by "

@@ -6,7 +6,7 @@ from html import escape
 from importlib.resources import files
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any, Sequence
+from typing import Any, Mapping, Sequence
 
 from matplotlib.figure import Figure
 
@@ -39,6 +39,12 @@ class Page:
     def text(self, text: str) -> Page:
         """Paragraphs."""
         self._body += [f"<p>{escape(part.strip())}</p>" for part in text.split("\n\n") if part.strip()]
+        return self
+
+    def links(self, files: Mapping[str, str]) -> Page:
+        """A line of links to files beside the page: text -> path, relative to the page's folder."""
+        shown = (f'<a href="{escape(path)}">{escape(text)}</a>' for text, path in files.items())
+        self._body.append(f'<p class="links">{" · ".join(shown)}</p>')
         return self
 
     def table(self, headings: Sequence[str], rows: Sequence[Sequence[Any]], caption: str = "") -> Page:

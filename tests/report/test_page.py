@@ -86,3 +86,8 @@ def test_environment_says_versions_but_not_whose_machine():
     assert {"kop_exudyn", "python", "exudyn", "numpy", "cores"} <= set(found)
     assert found["cores"] >= 1
     assert socket.gethostname() not in map(str, found.values())
+
+
+def test_links_lead_to_files_beside_the_page():
+    html = Page("Title").links({"3D & more": "viewer.html"}).html()
+    assert '<a href="viewer.html">3D &amp; more</a>' in html
