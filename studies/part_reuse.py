@@ -18,7 +18,7 @@ import numpy as np
 from kop_exudyn.analysis.reuse import counts_of, jaccard_matrix, part_users, reuse_figures
 from kop_exudyn.report.reuse_drawing import draw_reuse_over_size, draw_sharing, draw_subsets
 from kop_exudyn.report.study import Study
-from kop_exudyn.report.study_tasks import shared_sizes
+from kop_exudyn.report.study_tasks import shared_kits
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
 SHOWN = 12  # linear parts of the kit that is shown in detail
@@ -28,10 +28,9 @@ def main() -> None:
     study = Study.from_command_line(__doc__, __file__)
 
     # 1. The kits, from the folder of the other study where it was run.
-    tasks = shared_sizes(MODELS, study)
-    kits = study.sweep(tasks, also=[study.out.parent / "kit_size_tradeoff" / "sweep"], jobs=1)
-    kits = {task.settings["parts"]["linear"]: kits[task.name] for task in reversed(tasks)
-            if "failed" not in kits[task.name]}
+    _, best = shared_kits(study, MODELS, [study.out.parent / "kit_size_tradeoff" / "sweep"])
+    kits = {size: study.results[task.name].value for size, task in best.items()
+            if study.results[task.name].failed is None}
 
     # 2. The figures of each, and the details of one.
     found = {size: reuse_figures(kit["pieces"]) for size, kit in kits.items()}

@@ -23,7 +23,7 @@ from kop_exudyn.io.designs import load_design
 from kop_exudyn.optimize.stage_settings import StageSettings
 from kop_exudyn.report.projection_drawing import draw_changes, draw_projection
 from kop_exudyn.report.study import Study
-from kop_exudyn.report.study_tasks import QUICK, changed, project_task, shared_sizes
+from kop_exudyn.report.study_tasks import QUICK, changed, project_task, shared_kits
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
 STATES = ("direct", "relaxed", "built", "reassigned")
@@ -36,11 +36,10 @@ def main() -> None:
     file = MODELS / "small" / "06_moebius.json" if study.quick else MODELS / "conformals" / "06_moebius.json"
     size, factors = (3, (0.1, 10.0)) if study.quick else (12, tuple(10.0 ** (k / 2) for k in range(-4, 7)))
     stages = changed(QUICK if study.quick else StageSettings())
-    kits = [task for task in shared_sizes(MODELS, study) if task.settings["parts"]["linear"] >= size]
-    tasks = [Task(f"w_c {factor:.3g}", project_task, {"file": file, "factor": factor, "stages": stages},
-                  after=kits[-1].name) for factor in factors]
     other = study.out.parent / "kit_size_tradeoff" / "sweep"
-    study.sweep(kits, also=[other], jobs=1)
+    kits, best = shared_kits(study, MODELS, [other])
+    tasks = [Task(f"w_c {factor:.3g}", project_task, {"file": file, "factor": factor, "stages": stages},
+                  after=best[size].name) for factor in factors]
     found = study.sweep(kits + tasks, also=[other])
 
     # 2. One row a weight; the best one.
@@ -70,8 +69,8 @@ def main() -> None:
     columns = [f"{state} {what}" for state in STATES[1:] for what in ("max %", "J", "changes")]
     report.table("weights", [{"w_c": row["w_c"], **{name.replace("reassigned", "exchanged"): row[name]
                                                     for name in columns}} for row in rows],
-                 f"w_c over the weight of the fit; max %: largest deviation, {shown(direct)} after direct projection; J: "
-                 "the objective; changes: elements with other parts than then. A dash: no equilibrium was found.")
+                 f"w_c over the weight of the fit; max %: largest deviation, {shown(direct)} after direct projection; "
+                 "J: the objective; changes: elements with other parts than then. A dash: no equilibrium was found.")
     report.save({"finding": finding, "weights": rows, "design": design.name})
 
 

@@ -61,9 +61,34 @@ def changed(stages: StageSettings) -> dict[str, Any]:
     return {name: value for name, value in asdict(stages).items() if value != usual[name]}
 
 
-def shared_sizes(models: Path, study: Study) -> list[Task]:
-    """The kits of the trade-off study, which other studies look at as well: five C-shells, or two small ones."""
+def shared_kits(study: Study, models: Path, also: Sequence[Path] = ()) -> tuple[list[Task], dict[int, Task]]:
+    """The kits of the trade-off study, which other studies look at as well: five C-shells, or two small ones.
+
+    Down from the largest kit every one starts from the next larger one. Then, up from the smallest, a kit that is worse
+    than a smaller one is sought again from there: what few parts can do, more can do as well.
+
+    also : folders of other sweeps that may have the results
+
+    Returns all tasks, and by number of linear parts, the smallest first, the task with the better kit.
+    """
     jobs = 1 if study.scheduler else study.jobs  # workers of a cluster start no processes
     if study.quick:
-        return size_tasks(select_files(models / "small", 2), (2, 3, 5), {"angular": 2}, QUICK, jobs)
-    return size_tasks(select_files(models / "conformals", 5), SIZES, {"angular": 5}, FULL, jobs)
+        tasks = size_tasks(select_files(models / "small", 2), (2, 3, 5), {"angular": 2}, QUICK, jobs)
+    else:
+        tasks = size_tasks(select_files(models / "conformals", 5), SIZES, {"angular": 5}, FULL, jobs)
+    found = study.sweep(tasks, also=also, jobs=1)
+    best: dict[int, Task] = {}
+    smaller: Task | None = None
+    for task in reversed(tasks):
+        if smaller is not None and _objective(found[smaller.name]) < _objective(found[task.name]):
+            again = Task(f"{task.name} from {smaller.name}", kit_task, task.settings, task.options, after=smaller.name)
+            tasks = [*tasks, again]
+            found = study.sweep(tasks, also=also, jobs=1)
+            task = min(task, again, key=lambda one: _objective(found[one.name]))
+        best[task.settings["parts"]["linear"]] = smaller = task
+    return tasks, best
+
+
+def _objective(found: Mapping[str, Any]) -> float:
+    value = found.get("objective")
+    return float("inf") if value is None else value
