@@ -49,7 +49,7 @@ def main() -> None:
     finding = ("Exact Hessians take {} steps, {:,} equilibria and {:.0f} s of SQP; ".format(*totals["exact"])
                + "BFGS takes {} steps, {:,} equilibria and {:.0f} s ".format(*totals["bfgs"])
                + f"and ends with the worst joint {worst['bfgs']:.2g} % off instead of {worst['exact']:.2g} %. "
-               + f"With reassignments the method reaches {worst['method']:.2g} %.")
+               + f"With reassignments and leaps the method reaches {worst['method']:.2g} %.")
     report = study.report(finding)
 
     report.section("The method's course")
