@@ -1,0 +1,80 @@
+"""The tutorial, word by word: every command of its page succeeds, prints what the page shows, and makes its figures."""
+import csv
+import importlib.util
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+MEASURED = ("solved in", "Exudyn")  # lines with times, versions and rounding errors
+
+
+def _steps_of_the_page():
+    spec = importlib.util.spec_from_file_location("tutorial_steps", DOCS / "tutorial_steps.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses look their module up
+    spec.loader.exec_module(module)
+    return module
+
+
+tutorial = _steps_of_the_page()
+PAGE = tutorial.PAGE.read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def followed(tmp_path_factory):
+    """The folder after all steps, and what the commands printed beside what the page says."""
+    folder = tmp_path_factory.mktemp("tutorial")
+    printed = []
+    for step in tutorial.steps(PAGE):
+        done = tutorial.take(step, folder)
+        if done is not None:
+            assert done.returncode == 0, f"{step.command}\n{done.stderr}"
+            printed.append((step.command, step.text, done.stdout))
+    return folder, printed
+
+
+def test_all_blocks_of_the_page_are_steps():
+    assert PAGE.count("```{code-block}") == sum(1 for _ in re.finditer(r"^```\{code-block\} (?:python|console)", PAGE, re.M))
+    assert sum(step.command is not None for step in tutorial.steps(PAGE)) == len(re.findall(r"^\$ ", PAGE, re.M)) > 8
+
+
+def test_commands_print_what_the_page_shows(followed):
+    for command, shown, printed in followed[1]:
+        shown_lines, lines = shown.strip().splitlines(), printed.strip().splitlines()
+        assert len(shown_lines) == len(lines), f"{command}\n{printed}"
+        for expected, line in zip(shown_lines, lines):
+            assert NUMBER.sub("#", expected).split() == NUMBER.sub("#", line).split(), command
+            if not expected.startswith(MEASURED):
+                assert _numbers(line) == pytest.approx(_numbers(expected), rel=0.02), command
+
+
+def test_every_file_that_the_page_names_is_there(followed):
+    folder = followed[0]
+    named = set(re.findall(r"`((?:designs|kit|files|plans|surfaces)/[\w./]+)`", PAGE))
+    assert len(named) >= 8
+    for name in named:
+        assert (folder / name).exists(), name
+
+
+def test_every_figure_is_made_by_the_commands_and_kept(followed):
+    shown = re.findall(r"!\[.*?\]\((\S+?)\)", PAGE)
+    figures = tutorial.figures(PAGE)
+    assert sorted(shown) == sorted(f"tutorial/{figure}" for figure in figures) and len(shown) >= 4
+    for figure, made in figures.items():
+        assert (followed[0] / made).stat().st_size > 1000
+        assert (tutorial.FIGURES / figure).stat().st_size > 1000
+
+
+def test_pieces_that_the_text_counts(followed):
+    straight, corners = re.search(r"has (\d+) straight pieces and (\d+) corners", PAGE).groups()
+    with open(followed[0] / "files" / "workshop" / "assembly_vault.csv", newline="", encoding="utf-8") as file:
+        kinds = [row["kind"] for row in csv.DictReader(file)]
+    assert (kinds.count("linear"), kinds.count("angular")) == (int(straight), int(corners))
+
+
+def _numbers(line: str) -> list[float]:
+    return [float(number) for number in NUMBER.findall(line)]
