@@ -10,6 +10,8 @@ from docutils.parsers.rst import Directive
 
 _LIMITS = {"minimum": "≥ {}", "exclusiveMinimum": "> {:.4g}", "maximum": "≤ {}", "exclusiveMaximum": "< {:.4g}",
            "minItems": "at least {}", "maxItems": "at most {}"}
+_OPTIONAL = ", optional"
+_SHARED = {"point2": "[x, y]", "point3": "[x, y, z]", "positive": "number > 0", "name": "text"}
 
 
 def schema(name: str) -> dict[str, Any]:
@@ -24,7 +26,7 @@ def rows(content: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, str, 
     for name, value in content.get("properties", {}).items():
         if isinstance(value, dict):
             field = f"{prefix}{name}"
-            yield field, _kind(value) + ("" if name in required else ", optional"), value.get("description", "")
+            yield field, _kind(value) + ("" if name in required else _OPTIONAL), value.get("description", "")
             yield from rows(value, f"{field}.")
             if isinstance(items := value.get("items"), dict):
                 yield from rows(items, f"{field}[].")
@@ -34,7 +36,8 @@ def _kind(value: dict[str, Any]) -> str:
     if "enum" in value or "const" in value:
         return " | ".join(json.dumps(choice) for choice in value.get("enum", [value.get("const")]))
     if "$ref" in value:
-        return value["$ref"].rsplit("/", 1)[-1]
+        name = value["$ref"].rsplit("/", 1)[-1]
+        return _SHARED.get(name, name)
     kind = value.get("type", "one of several")
     limits = [form.format(value[key]) for key, form in _LIMITS.items() if key in value]
     return ", ".join([" or ".join([kind] if isinstance(kind, str) else kind), *limits])
@@ -46,7 +49,10 @@ class Fields(Directive):
     required_arguments = 1
 
     def run(self) -> list[nodes.Node]:
-        found = dict((row[0], row) for name in ("design", self.arguments[0]) for row in rows(schema(name)))
+        found = {row[0]: row for row in rows(schema("design"))}
+        for field, kind, meaning in rows(schema(self.arguments[0])):
+            needed = field in found and not found[field][1].endswith(_OPTIONAL)
+            found[field] = (field, kind.removesuffix(_OPTIONAL) if needed else kind, meaning)
         return [_table(("field", "value", "meaning"), found.values())]
 
 
