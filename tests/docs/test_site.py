@@ -1,11 +1,15 @@
 """The documentation: builds without a warning, and what its Python page shows is what happens."""
 import doctest
 import json
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from kop_exudyn.io.studies import load_study
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -32,9 +36,19 @@ def test_class_pages_show_the_schemas_fields(site, name):
         assert f">{field}<" in html
 
 
-def test_the_python_page(tmp_path, monkeypatch):
+@pytest.mark.parametrize("name, least", [("api", 30), ("howto", 12)])
+def test_python_lines_do_what_the_pages_say(name, least, tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
-    page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8").replace("```", "")  # fences aren't output
-    test = doctest.DocTestParser().get_doctest(page, {"folder": tmp_path}, "api.md", "docs/api.md", 0)
+    page = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8").replace("```", "")  # fences aren't output
+    test = doctest.DocTestParser().get_doctest(page, {"folder": tmp_path}, name, f"docs/{name}.md", 0)
     result = doctest.DocTestRunner().run(test)
-    assert result.attempted > 20 and result.failed == 0
+    assert result.attempted >= least and result.failed == 0
+
+
+def test_the_study_file_of_the_how_to_page(tmp_path):
+    page = (ROOT / "docs" / "howto.md").read_text(encoding="utf-8")
+    content, = re.findall(r"^```toml\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    shutil.copytree(ROOT / "models" / "small", tmp_path, dirs_exist_ok=True)
+    (tmp_path / "study.toml").write_text(content, encoding="utf-8")
+    study = load_study(tmp_path / "study.toml")
+    assert [design.name for design in study.designs()] == ["small sinh", "small exp"] and study.counts == (1.0, 2.0)
