@@ -40,7 +40,7 @@ def steps(page: str) -> list[Step]:
             found.append(Step(None, _CAPTION.search(options)[1], body))
         else:
             for part in re.split(r"^\$ ", body, flags=re.MULTILINE)[1:]:
-                command, _, output = part.partition("\n")
+                command, _, output = re.sub(r"\\\n\s*", "", part).partition("\n")
                 found.append(Step(command, "", output))
     return found
 
@@ -76,7 +76,7 @@ def make_figures() -> None:
         for figure, made in figures(page).items():
             source = Path(name) / made
             if source.suffix == ".png":
-                Image.open(source).convert("RGB").quantize(64).save(FIGURES / figure, optimize=True)
+                Image.open(source).convert("RGB").quantize(256).save(FIGURES / figure, optimize=True)
             else:
                 (FIGURES / figure).write_bytes(source.read_bytes())
 
