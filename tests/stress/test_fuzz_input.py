@@ -10,9 +10,9 @@ import zipfile
 import numpy as np
 import pytest
 
-from kop_exudyn.analysis.stress.corpus import corpus
-from kop_exudyn.analysis.stress.fuzz import READERS, fuzz
-from kop_exudyn.analysis.stress.mutations import Tripwire, mutate, pickled_array
+from kop_exudyn.io.stress.corpus import corpus
+from kop_exudyn.io.stress.fuzz import READERS, fuzz
+from kop_exudyn.io.stress.mutations import Tripwire, mutate, pickled_array
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.arrays import load_arrays
 from kop_exudyn.io.designs import load_design

@@ -7,7 +7,7 @@ import os
 import numpy as np
 import pytest
 
-from kop_exudyn.analysis.stress import kills
+from kop_exudyn.io.stress import kills
 from kop_exudyn.analysis.stress.arch import arches
 from kop_exudyn.analysis.stress.interruption import FailingStore, MemoryStore, fingerprint, resumed_at
 from kop_exudyn.errors import InputError

@@ -1,1 +1,1 @@
-"""Tools that try to break the rest: seeded random structures, mutated files, and judges that trust nobody."""
+"""Tools that try to break the rest: seeded random structures, interrupted runs, and judges that trust nobody."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...io.arrays import save_arrays
+from ..arrays import save_arrays
 from ...kit.parts import Kit
 from ...structures.umbrella_generator import parallelogram_patch
 from ...structures.umbrella_layout import BaseMesh, Plates, umbrella_mesh
@@ -16,6 +16,33 @@ from ...structures.umbrella_mesh import UmbrellaMesh
 _ENVELOPE = {"format": "kop_exudyn/design", "version": 1}
 _RODS = {"material": {"young": 2100.0, "poisson": 0.35},
          "section": {"type": "rectangle", "width": 0.02, "height": 0.01}}
+
+_DRAWING = """v 0 0 0
+v 2 0 0
+v 0 1 0
+v 2 1 0
+v 0.5 -1 0
+v 0.6 0.5 0
+v 0.5 2 0
+v 1 -1 0
+v 1 2 0
+l 1 2
+l 3 4
+l 5 6 7
+l 8 9
+"""
+STUDY_DESIGNS = ("one.json", "two.json")  # files that the study names
+_STUDY = """format = "kop_exudyn/study"
+version = 1
+designs = ["one.json", {file = "two.json", weight = 2}]
+parts = {linear = 3}
+[weights]
+energy = 0.05
+[settings]
+seed = 2
+schedule = [1e3, 1e5]
+bounds.linear = {lower = 0.1, upper = [1, 2]}
+"""
 
 
 def corpus(folder: Any) -> dict[str, bytes]:
@@ -40,7 +67,8 @@ def corpus(folder: Any) -> dict[str, bytes]:
            + "".join(f"{x:.4f} {y:.4f} {z:.4f}\n" for x, y, z in vertices)
            + "".join(f"3 {a} {b} {c}\n" for a, b, c in faces))
     return {**{name: json.dumps(document).encode() for name, document in documents.items()},
-            "mesh-patch.obj": obj.encode(), "mesh-patch.ply": ply.encode(), "mesh-patch.stl": _stl(vertices, faces),
+            "mesh-compas.json": json.dumps(_compas()).encode(), "drawing-net.obj": _DRAWING.encode(),
+            "drawing-net.dxf": _dxf(), "study-small.toml": _STUDY.encode(), "mesh-patch.obj": obj.encode(), "mesh-patch.ply": ply.encode(), "mesh-patch.stl": _stl(vertices, faces),
             "states-small.npz": _archive(folder, _states()), "checkpoint-small.npz": _archive(folder, _checkpoint())}
 
 
@@ -107,6 +135,29 @@ def _result(kit: Kit) -> dict[str, Any]:
             "kit": kit.to_dict(), "assignment": [{"kind": "linear", "part": [0, 1], "variant": [1, 0]}],
             "steps": {"relaxed": 10, "assigned": 5}, "equilibria": 100, "newton_iterations": 400, "wall_s": 12.5,
             "peak_memory_mb": 300.0, "settings": {"seed": 0}}
+
+
+def _compas() -> dict[str, Any]:
+    return {"dtype": "compas.datastructures/Mesh", "data": {
+        "default_vertex_attributes": {"x": 0.0, "y": 0.0, "z": 0.0},
+        "vertex": {str(k): {"x": k % 2, "y": k // 2, "z": 0.1 * k} for k in range(6)},
+        "face": {"0": [0, 1, 3, 2], "1": [2, 3, 5], "2": [2, 5, 4]}}}
+
+
+def _dxf() -> bytes:
+    """The part of a DXF file that matters, with every kind of curve."""
+    import ezdxf
+
+    document = ezdxf.new("R12")
+    space = document.modelspace()
+    for y in (0, 1):
+        space.add_line((-0.2, y), (2.2, y))
+    space.add_polyline2d([(0, -0.2), (0.1, 0.5), (0, 1.2)])
+    space.add_arc((-8, 0.5), 10, -10, 10)
+    text = io.StringIO()
+    document.write(text)
+    whole = text.getvalue()
+    return ("  0\nSECTION\n  2\n" + whole[whole.index("ENTITIES"):]).encode()
 
 
 def _states() -> dict[str, np.ndarray]:

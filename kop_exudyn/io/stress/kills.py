@@ -11,9 +11,9 @@ from typing import Any, Sequence
 
 import numpy as np
 
-from ...io.arrays import load_arrays
-from ...io.json_files import write_json
-from .arch import arch_data
+from ...analysis.stress.arch import arch_data
+from ..arrays import load_arrays
+from ..json_files import write_json
 
 # `kop` itself, with the class of the stress tests known to it
 _PROGRAM = "import sys, kop_exudyn.analysis.stress.arch; from kop_exudyn.cli import main; sys.exit(main())"

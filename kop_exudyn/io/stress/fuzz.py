@@ -1,24 +1,28 @@
 """Feeds damaged files to every reader: each must read them or raise InputError, soon, and in bounded memory."""
 from __future__ import annotations
 
+import logging
 import traceback
 from collections import Counter
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Callable, Iterable
+from typing import Any, Callable, Iterable, Iterator
 
 import numpy as np
 
+from ...analysis.stress.limits import TimeOut, memory_limit, time_limit
 from ...errors import InputError
-from ...io.checkpoint import CheckpointStore, Job
-from ...io.designs import load_design
-from ...io.kits import load_kit
-from ...io.results import load_result, load_states
 from ...optimize.history import SQPState
 from ...structures.mesh_surface import load_mesh_surface
-from .corpus import corpus
-from .limits import TimeOut, memory_limit, time_limit
+from ..checkpoint import CheckpointStore, Job
+from ..designs import load_design
+from ..drawn_networks import read_network
+from ..kits import load_kit
+from ..results import load_result, load_states
+from ..studies import load_study
+from .corpus import STUDY_DESIGNS, corpus
 from .mutations import Tripwire, mutate
 
 
@@ -30,12 +34,12 @@ def _checkpoint(path: Path) -> SQPState:
 
 READERS: dict[str, Callable[[Path], Any]] = {
     "design": load_design, "kit": load_kit, "result": load_result, "states": load_states, "checkpoint": _checkpoint,
-    "job": Job.load, "mesh": load_mesh_surface,
+    "job": Job.load, "mesh": load_mesh_surface, "drawing": read_network, "study": load_study,
 }
 
 # How often a file of the corpus is chosen, where reading it is slow.
-_SELDOM = {"design-grid.json": 0.2, "design-release.json": 0.5, "mesh-patch.obj": 0.3, "mesh-patch.ply": 0.3,
-           "mesh-patch.stl": 0.3}
+_SELDOM = {"design-grid.json": 0.2, "design-release.json": 0.5, "drawing-net.dxf": 0.3, "mesh-patch.obj": 0.3,
+           "mesh-patch.ply": 0.3, "mesh-patch.stl": 0.3}
 
 
 @dataclass(frozen=True)
@@ -69,9 +73,11 @@ def fuzz(seeds: Iterable[int], folder: Path, seconds: float = 20.0, megabytes: f
     names = sorted(files)
     weights = np.array([_SELDOM.get(name, 1.0) for name in names])
     result = FuzzResult()
+    for name in STUDY_DESIGNS:
+        (folder / name).touch()
     for name in names:  # once as they are: modules are loaded before memory is limited, and the files are valid
         READERS[name.partition("-")[0]](_written(folder, name, files[name]))
-    with memory_limit(megabytes):
+    with memory_limit(megabytes), _quiet():
         for seed in seeds:
             rng = np.random.default_rng([seed, 2])
             name = names[rng.choice(len(names), p=weights / weights.sum())]
@@ -79,6 +85,17 @@ def fuzz(seeds: Iterable[int], folder: Path, seconds: float = 20.0, megabytes: f
             _read(seed, name, path, result, seconds)
             path.unlink()
     return result
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Without the messages of readers that leave out what they don't know."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logging.disable(before)
 
 
 def _written(folder: Path, name: str, content: bytes) -> Path:
