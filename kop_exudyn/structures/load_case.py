@@ -11,7 +11,7 @@ from ..errors import InputError
 
 @dataclass(frozen=True)
 class LoadCase:
-    """Loads on the deployed state, in the design's own axes.
+    """Loads on the deployed state, in the design's own axes; lists become arrays.
 
     gravity : (3,) acceleration that gives the rods their weight, or None
     joints (m,), forces (m, 3) : forces that keep their direction, and the joints that they act on (from 0)
@@ -22,6 +22,11 @@ class LoadCase:
     joints: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
     forces: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     supports: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        for name, kind in (("gravity", float), ("joints", int), ("forces", float), ("supports", int)):
+            if (value := getattr(self, name)) is not None:
+                object.__setattr__(self, name, np.asarray(value, kind))
 
     @property
     def empty(self) -> bool:
