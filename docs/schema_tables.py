@@ -11,7 +11,8 @@ from docutils.parsers.rst import Directive
 _LIMITS = {"minimum": "≥ {}", "exclusiveMinimum": "> {:.4g}", "maximum": "≤ {}", "exclusiveMaximum": "< {:.4g}",
            "minItems": "at least {}", "maxItems": "at most {}"}
 _OPTIONAL = ", optional"
-_SHARED = {"point2": "[x, y]", "point3": "[x, y, z]", "positive": "number > 0", "name": "text"}
+_SHARED = {"point2": "[x, y]", "point3": "[x, y, z]", "positive": "number > 0", "name": "text",
+           "material": "object", "section": "object"}
 
 
 def schema(name: str) -> dict[str, Any]:
@@ -27,9 +28,18 @@ def rows(content: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, str, 
         if isinstance(value, dict):
             field = f"{prefix}{name}"
             yield field, _kind(value) + ("" if name in required else _OPTIONAL), value.get("description", "")
-            yield from rows(value, f"{field}.")
+            yield from rows(_defined(value), f"{field}.")
             if isinstance(items := value.get("items"), dict):
                 yield from rows(items, f"{field}[].")
+
+
+def _defined(value: dict[str, Any]) -> dict[str, Any]:
+    """What a reference to the schema of all classes stands for; anything else itself."""
+    address, _, name = value.get("$ref", "").partition("#/$defs/")
+    if not address:
+        return value
+    common = files("kop_exudyn") / "io" / "schemas" / "common.schema.json"
+    return json.loads(common.read_text(encoding="utf-8"))["$defs"][name]
 
 
 def _kind(value: dict[str, Any]) -> str:
