@@ -64,3 +64,13 @@ def equilibrium(scene, start=None, confirm=True):
 @pytest.fixture(scope="session")
 def rods():
     return SimpleNamespace(axes_along=axes_along, add=add_rod, hold_plane=hold_plane, equilibrium=equilibrium, none=NONE)
+
+
+@pytest.fixture
+def classical(record_property):
+    """Tells studies/stress.py what a classical case compared: the case, its source, rod elements, and two numbers."""
+    def record(case: str, source: str, elements: int, reference: float, found: float) -> None:
+        record_property("classical", {"case": case, "source": source, "elements": elements, "reference": float(reference),
+                                      "found": float(found)})
+
+    return record

@@ -24,7 +24,7 @@ EULER = {"free": ((), 4.0), "guided": ((1, 2, 3, 4, 5), 0.25), "pinned": ((1, 2)
 
 
 @pytest.mark.parametrize("held, effective", EULER.values(), ids=EULER.keys())
-def test_euler_columns(rods, held, effective):
+def test_euler_columns(rods, classical, held, effective):
     """32 elements: within 0.5 %. Bending about both axes alike, so two modes at once."""
     builder = SceneBuilder()
     bodies = rods.add(builder, 32, [0, 0, 0], np.eye(3), 1.0, [RIGID, RIGID, RIGID, 1.0, 1.0, 1.0])
@@ -33,10 +33,12 @@ def test_euler_columns(rods, held, effective):
     path = trace(builder.build(), rods.none, DeadForces(bodies[-1:], [-1.0, 0, 0]),
                  stop=lambda p: p.factor > 1.05 * np.pi**2 / effective, options=PathOptions(rotation=1e-7))
     assert first_bifurcation(path) == pytest.approx(np.pi**2 / effective, rel=5e-3)
+    classical(f"Euler column, effective length {np.sqrt(effective):.3g} L: P L²/EI", "Euler 1744", 32, np.pi**2 / effective,
+              first_bifurcation(path))
     assert path.points[-1].negative == 2
 
 
-def test_lateral_buckling_of_a_strip(rods):
+def test_lateral_buckling_of_a_strip(rods, classical):
     """Cantilever strip bent in its plane by a force at its end (Michell and Prandtl 1899; Timoshenko and Gere, art. 6.3):
     P L^2 = 4.0126 sqrt(EI GJ), EI the small one. 24 elements: within 0.3 %.
     """
@@ -47,6 +49,8 @@ def test_lateral_buckling_of_a_strip(rods):
     path = trace(builder.build(), rods.none, DeadForces(bodies[-1:], [0, 0, -1.0]), stop=lambda p: p.factor > 8,
                  options=PathOptions(rotation=1e-6))
     assert first_bifurcation(path) == pytest.approx(4.0126 * np.sqrt(EI * GJ), rel=3e-3)
+    classical("lateral buckling of a strip: P L²/√(EI GJ)", "Michell, Prandtl 1899", 24, 4.0126,
+              first_bifurcation(path) / np.sqrt(EI * GJ))
 
 
 def right_angle_frame(rods, n: int):
@@ -59,7 +63,7 @@ def right_angle_frame(rods, n: int):
     return builder.build(), second[-1]
 
 
-def test_right_angle_frame(rods):
+def test_right_angle_frame(rods, classical):
     """Argyris et al., CMAME 20 (1979); Simo and Vu-Quoc (1986), ex. 7.6: an in-plane force at the free end, along the
     clamped leg and away from the clamp, buckles the frame sideways at 1.088 to 1.09. 24 elements a leg: within 0.5 %.
     """
@@ -67,6 +71,7 @@ def test_right_angle_frame(rods):
     path = trace(scene, rods.none, DeadForces([end], [1.0, 0, 0]), stop=lambda p: p.factor > 1.5,
                  options=PathOptions(rotation=1e-3))
     assert first_bifurcation(path) == pytest.approx(1.088, rel=5e-3)
+    classical("right-angle frame: lateral buckling load", "Argyris et al. 1979", 48, 1.088, first_bifurcation(path))
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -83,7 +88,7 @@ def test_right_angle_frame_after_buckling(rods, side):
     assert np.allclose(mirrored.state.positions * [1, -1, 1], eq.state.positions, atol=1e-4)
 
 
-def test_twisted_straight_rod(rods):
+def test_twisted_straight_rod(rods, classical):
     """Greenhill 1883, for clamped ends of which one may turn about and slide along the axis: the torque at which a
     straight rod leaves its axis is 2 u EI/L with tan u = u, u = 4.493409. 24 elements: within 0.1 %.
     """
@@ -102,10 +107,11 @@ def test_twisted_straight_rod(rods):
                  options=PathOptions(rotation=0.3))
     critical = path.first("bifurcation").point
     assert critical.factor == pytest.approx(2 * 4.493409 * EI, rel=1e-3)
+    classical("twisted straight rod: torque L/EI", "Greenhill 1883", n, 2 * 4.493409, critical.factor / EI)
     assert critical.displacement == pytest.approx(critical.factor / GJ, rel=1e-6)  # twisted by more than a turn
 
 
-def test_twisted_ring(rods):
+def test_twisted_ring(rods, classical):
     """Michell 1889 (Zajac 1962; Goriely 2006): a straight isotropic rod, bent to a ring of radius R and twisted before
     its ends are joined, leaves the plane at a twisting moment of sqrt(3) EI/R. 48 elements: within 0.3 %.
     """
@@ -127,5 +133,6 @@ def test_twisted_ring(rods):
     path = trace(scene, rods.none, HingeTorques(hinge, 1.0, scene.n_bodies), stop=lambda p: p.factor > 1.9,
                  options=PathOptions(rotation=0.3))
     assert first_bifurcation(path) == pytest.approx(np.sqrt(3) * EI, rel=3e-3)
+    classical("twisted ring: torque R/EI", "Michell 1889", n, np.sqrt(3), first_bifurcation(path) / EI)
     # twisted and bent elements are helices, which tilts the ring against the joint by O(h^2): no further than that
     assert all(np.abs(p.state.positions[:, 2]).max() < 3e-3 for p in path.points if p.factor < 1.8)

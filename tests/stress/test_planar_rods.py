@@ -26,7 +26,7 @@ def cantilever(rods, n: int, stretch: float = STIFF):
 
 
 @pytest.mark.parametrize("turns, n", [(1, 4), (1, 8), (2, 8), (2, 16)])
-def test_roll_up(rods, turns, n):
+def test_roll_up(rods, classical, turns, n):
     """Simo and Vu-Quoc, CMAME 58 (1986), ex. 7.1: an end moment 2 pi EI / L closes a cantilever to a circle.
 
     Exact for any number of elements (each bends by less than pi) and one load step.
@@ -37,7 +37,10 @@ def test_roll_up(rods, turns, n):
     assert np.allclose(eq.state.rotations[-1], np.eye(3), atol=1e-7)
     radius = LENGTH / (2 * np.pi * turns)
     centre = np.array([0, 0, -radius])
-    assert np.allclose(np.linalg.norm(eq.state.positions - centre, axis=1), radius, rtol=1e-8)
+    radii = np.linalg.norm(eq.state.positions - centre, axis=1)
+    assert np.allclose(radii, radius, rtol=1e-8)
+    classical(f"roll-up, {turns} full circle{'s' if turns > 1 else ''}: radius", "Simo, Vu-Quoc 1986, 7.1", n, radius,
+              radii[np.argmax(np.abs(radii - radius))])
     assert np.allclose(eq.stress, [0, 0, 0, 0, moment, 0], atol=1e-6)
 
 
@@ -57,16 +60,17 @@ def elastica_by_quadrature(load: float) -> tuple[float, float, float]:
 
 
 @pytest.mark.parametrize("load, w, u, slope", ELASTICA)
-def test_elastica_under_a_tip_force(rods, load, w, u, slope):
+def test_elastica_under_a_tip_force(rods, classical, load, w, u, slope):
     assert elastica_by_quadrature(load) == pytest.approx((w, u, slope), abs=1e-5)
     n = 32
     eq = rods.equilibrium(cantilever(rods, n).with_terms(DeadForces([n], [0, 0, load * EI / LENGTH**2])))
     x, _, z = eq.state.positions[-1]
     tip = eq.state.rotations[-1][:, 0]
     assert (z, LENGTH - x, np.arctan2(tip[2], tip[0])) == pytest.approx((w, u, slope), rel=1e-3)
+    classical(f"elastica, tip force {load} EI/L²: deflection / L", "Mattiasson 1981", n, w, z)
 
 
-def test_order_of_convergence(rods):
+def test_order_of_convergence(rods, classical):
     """The error of the tip falls with the second power of the element length; 8 elements are within 0.3 %."""
     load = 5.0
     w, u, _ = elastica_by_quadrature(load)
@@ -78,10 +82,11 @@ def test_order_of_convergence(rods):
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert orders == pytest.approx([2, 2, 2], abs=0.1)
     assert errors[1] < 3e-3
+    classical("order of convergence, elastica with 16 to 32 elements", "theory", 32, 2.0, orders[-1])
 
 
 @pytest.mark.parametrize("shortening", [0.05, 0.2, 0.4])
-def test_clamped_elastica_pushed_together(rods, shortening):
+def test_clamped_elastica_pushed_together(rods, classical, shortening):
     """Both ends clamped and pushed together: four quarter waves of the inflectional elastica (Love, art. 263).
 
     P L^2/EI = 16 K(k)^2, shortening/L = 2 (1 - E(k)/K(k)), rise/L = k/K(k).
@@ -100,4 +105,5 @@ def test_clamped_elastica_pushed_together(rods, shortening):
     rise = np.abs(eq.state.positions[:, 2]).max()
     force = Sensitivities(system, eq).potential_gradient[0]  # energy / shortening
     assert rise == pytest.approx(k / ellipk(k * k) * LENGTH, rel=2e-3)
+    classical(f"clamped elastica, shortened by {shortening:.0%}: rise / L", "Love, art. 263", n, k / ellipk(k * k), rise)
     assert force == pytest.approx(16 * ellipk(k * k) ** 2 * EI / LENGTH**2, rel=5e-3)

@@ -53,7 +53,7 @@ def shallow_limit() -> float:
     return -minimize_scalar(lambda d: -shallow_leg_load(d), bounds=(0.1, 0.3), method="bounded").fun
 
 
-def test_williams_toggle(rods):
+def test_williams_toggle(rods, classical):
     """Limit load by beam-column theory 33.85, within 0.2 % (32 elements a leg); 34.04 is often quoted (1 %)."""
     scene, load = star(rods, 2, 32)
     path = trace(scene, rods.none, load, stop=lambda p: p.displacement > 0.15)
@@ -61,6 +61,7 @@ def test_williams_toggle(rods):
     assert (top.kind, bottom.kind) == ("limit", "limit")
     assert top.point.factor == pytest.approx(2 * shallow_limit(), rel=2e-3)
     assert top.point.factor == pytest.approx(34.0392, rel=0.01)
+    classical("two-bar toggle: limit load", "Williams 1964, by quadrature", 64, 2 * shallow_limit(), top.point.factor)
     # the whole curve, not only its extremes
     for point in path.points[1:]:
         sink = point.displacement + RISE
@@ -69,7 +70,7 @@ def test_williams_toggle(rods):
     assert bottom.point.factor < 32
 
 
-def test_star_dome(rods):
+def test_star_dome(rods, classical):
     """Six legs share the load of a symmetric path evenly: three toggles, and no earlier bifurcation."""
     scene, load = star(rods, 6, 16)
     dome = trace(scene, rods.none, load, stop=lambda p: p.displacement > 0.15)
@@ -77,6 +78,8 @@ def test_star_dome(rods):
     assert [c.kind for c in dome.critical] == ["limit", "limit"]
     assert [c.point.factor for c in dome.critical] == pytest.approx([3 * c.point.factor for c in toggle.critical], rel=1e-5)
     assert dome.critical[0].point.factor == pytest.approx(6 * shallow_limit(), rel=4e-3)
+    classical("star dome of six legs: limit load", "Williams 1964, by quadrature", 96, 6 * shallow_limit(),
+              dome.critical[0].point.factor)
 
 
 def _toggle(rods, n):
@@ -115,7 +118,7 @@ def test_driven_through_the_limit_point(rods):
         assert Sensitivities(system, eq).potential_gradient[0] == pytest.approx(point.factor, rel=1e-5, abs=1e-5)
 
 
-def test_deep_arch(rods):
+def test_deep_arch(rods, classical):
     """Clamped-hinged arch of 215 degrees, radius 100, EI 1e6, EA 1e8 (DaDeppo and Schmidt 1975; Simo and Vu-Quoc 1986,
     ex. 7.3): crown load 897 at the limit point. 80 elements: within 0.2 %; 40 give 901.6 (Simo and Vu-Quoc: 905.28).
     """
@@ -135,10 +138,11 @@ def test_deep_arch(rods):
         path = trace(builder.build(), rods.none, DeadForces([crown], [0, 0, -1.0]), stop=lambda p: p.displacement > 18)
         limits[n] = path.first("limit").point.factor
     assert limits[80] == pytest.approx(897, rel=2e-3)
+    classical("deep clamped-hinged arch: limit load", "DaDeppo, Schmidt 1975", 80, 897, limits[80])
     assert 897 < limits[80] < limits[40] < 905.28
 
 
-def test_lee_frame(rods):
+def test_lee_frame(rods, classical):
     """Hinged right-angle frame with legs of 120, loaded at a fifth of its beam (Lee et al. 1968; Simo and Vu-Quoc 1986,
     ex. 7.4): limit load 18,532, then a snap-back. 40 elements a leg: within 0.2 %.
     """
@@ -155,6 +159,7 @@ def test_lee_frame(rods):
     path = trace(builder.build(), rods.none, DeadForces(short[-1:], [0, 0, -1.0]), stop=lambda p: p.displacement > -25)
     assert [c.kind for c in path.critical] == ["limit", "turning", "turning", "limit"]
     assert path.critical[0].point.factor == pytest.approx(18532, rel=2e-3)
+    classical("Lee's frame: limit load", "Simo, Vu-Quoc 1986, 7.4", 80, 18532, path.critical[0].point.factor)
     # between the turning points not even a displacement holds it
     held = [p.held for p in path.points]
     assert held[0] and held[-1] and not all(held)

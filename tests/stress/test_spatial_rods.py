@@ -27,13 +27,14 @@ def bend(rods, n: int):
 
 
 @pytest.mark.parametrize("load, tip", BEND)
-def test_45_degree_bend(rods, load, tip):
+def test_45_degree_bend(rods, classical, load, tip):
     """32 elements, each load at once from the unstressed bend: within 0.1 % of the load's deflection."""
     scene, end = bend(rods, 32)
     eq = rods.equilibrium(scene.with_terms(DeadForces([end], [0, 0, load])))
     moved = eq.state.positions[end] - scene.initial.positions[end]
     # the bend curves towards +x, so that radial is x
     assert moved == pytest.approx(np.array(tip), abs=1e-3 * np.linalg.norm(tip))
+    classical(f"45-degree bend, load {load}: deflection along the load", "NAFEMS 3DNLG-5", 32, tip[2], moved[2])
 
 
 # Simo and Vu-Quoc, CMAME 58 (1986), ex. 7.5: tip position (along the clamp's tangent, radial, load), 8 straight elements
@@ -55,7 +56,7 @@ PRINCETON = [(8.896, (0, 0.04208, 0.07939, 0.10899, 0.12989, 0.14219, 0.14625)),
 
 
 @pytest.mark.parametrize("load, flaps", PRINCETON)
-def test_princeton_beam(rods, load, flaps):
+def test_princeton_beam(rods, classical, load, flaps):
     """20 elements; flap within 0.2 %."""
     stiffness = rectangle(12.3777e-3, 3.2024e-3).stiffness(Material(71.7e9, 0.31))
     builder = SceneBuilder()
@@ -66,10 +67,11 @@ def test_princeton_beam(rods, load, flaps):
         force = load * np.array([0, np.cos(angle), np.sin(angle)])
         eq = rods.equilibrium(scene.with_terms(DeadForces(bodies[-1:], force)))
         assert eq.state.positions[-1, 2] == pytest.approx(flap, rel=2e-3, abs=1e-9)
+    classical(f"Princeton beam, {load} N across: flap, m", "Exudyn's test suite", 20, flaps[-1], eq.state.positions[-1, 2])
 
 
 @pytest.mark.parametrize("n", [3, 6, 12])
-def test_a_straight_rod_wound_to_a_helix(rods, n):
+def test_a_straight_rod_wound_to_a_helix(rods, classical, n):
     """Ends led to the poses of a helix of 0.9 turns: with GJ = EI the rod is one, exact with any number of elements."""
     K = [1e5, 1e5, 1e5, 1.0, 1.0, 1.0]
     twist, curvature = 3.0, 4.0
@@ -90,6 +92,7 @@ def test_a_straight_rod_wound_to_a_helix(rods, n):
         assert np.abs(state.positions - p).max() < 1e-9
         assert np.allclose(eq.stress[:, 3:], share * np.array([twist, 0, curvature]), atol=1e-7)
         assert np.abs(eq.stress[:, :3]).max() < 1e-5
+    classical("helix of 0.9 turns from a straight rod: curvature", "closed form", n, curvature, eq.stress[0, 5])
 
 
 def test_placement_and_load_steps_do_not_matter(rods):
