@@ -13,6 +13,8 @@ from kop_exudyn import __version__, cli
 from kop_exudyn.analysis import simulation
 from kop_exudyn.commands import NAMES
 from kop_exudyn.errors import InputError, SimulationFailure
+from kop_exudyn.io.kits import load_kit, save_kit
+from kop_exudyn.kit.parts import Kit
 from kop_exudyn.report import kit_run
 from kop_exudyn.structures import base
 
@@ -38,7 +40,7 @@ def quiet_loggers():
 @pytest.fixture
 def design_file(monkeypatch, write_json_file):
     """A design of a class whose reader only keeps the name."""
-    monkeypatch.setitem(base._REGISTRY, "named", lambda data, source: SimpleNamespace(name=data["name"]))
+    monkeypatch.setitem(base._REGISTRY, "named", lambda data, source: SimpleNamespace(name=data["name"], fit_weight=1e5))
     return write_json_file("set/arch.json", {"format": "kop_exudyn/design", "version": 1, "class": "named",
                                              "name": "arch"})
 
@@ -233,7 +235,37 @@ class TestOptimize:
 
     def test_parts_must_come_from_somewhere(self, asked, design_file, tmp_path, capsys):
         assert status_of("optimize", design_file.parent, "--out", tmp_path / "out") == 2
-        assert "--parts is required" in capsys.readouterr().err and "parts" not in asked
+        assert "--parts or --kit is required" in capsys.readouterr().err and "parts" not in asked
+
+    def test_a_kit_that_exists(self, asked, design_file, tmp_path, capsys):
+        file = save_kit(tmp_path / "kit.json", Kit({"linear": [[0.1, 0.2], [0.3, 0.3]], "angular": [0.2]}))
+        arguments = ("optimize", design_file.parent, "--out", tmp_path / "out", "--kit")
+        assert status_of(*arguments, file) == 0
+        assert asked["parts"] == {"linear": 2, "angular": 1} and asked["kit"].to_dict() == load_kit(file).to_dict()
+        assert status_of(*arguments, file, "--parts", "linear=2") == 2
+        assert "give --kit or --parts" in capsys.readouterr().err
+        assert status_of(*arguments, tmp_path / "no.json") == 2
+        assert "no.json: no such file" in capsys.readouterr().err
+
+    def test_weights_of_terms(self, asked, design_file, tmp_path, capsys):
+        arguments = ("optimize", design_file.parent, "--parts", "linear=1", "--out", tmp_path / "out", "--weights")
+        assert status_of(*arguments, "energy=0.5,stress=2") == 0
+        weights = asked["settings"].weights
+        assert (weights.fit, weights.energy, weights.others) == (1e5, 0.5, (("stress", 2.0),))
+        for text, message in (("beauty=1", "weights = 'beauty': unknown term"), ("stress=x", "expected TERM=WEIGHT"),
+                              ("stress=-1", "weights.stress = -1"), ("fit=1,fit=2", "given twice")):
+            capsys.readouterr()
+            assert status_of(*arguments, text) == 2
+            error = capsys.readouterr().err
+            assert message in error and error.count("\n") == 1
+
+    def test_names_that_are_too_long_for_a_file(self, capsys, tmp_path):
+        long = "n" * 300
+        for arguments in (("simulate", long), ("view", long, "--out", "y"), ("optimize", long, "--parts", "linear=1", "--out", "y"),
+                          ("export", long, long, "--unit", "m", "--out", long)):
+            assert status_of(*arguments) == 2
+            error = capsys.readouterr().err
+            assert error.startswith(f"kop: {long}: ") and error.count("\n") == 1
 
     def test_a_design_that_fails_in_the_end(self, asked, design_file, tmp_path, capsys):
         asked["failed"] = ["arch"]

@@ -35,7 +35,7 @@ def find_kit(designs: Sequence[Design], parts: Mapping[str, int], stages: StageS
     """
     with DesignPool(designs, jobs) as pool:
         pool.prepare()
-        dataset = Dataset.of_pool(pool, Weights(fit=max(design.fit_weight for design in designs)))
+        dataset = Dataset.of_pool(pool, Weights.suiting(designs))
         search = Stages(dataset, parts, stages)
         at_parts = _from_inputs(search) if start is None else _from_neighbour(search, np.concatenate(list(start)))
         return _plain(dataset, in_rounds(search, at_parts))

@@ -33,7 +33,7 @@ def project_design(design: Design, kit: Kit, factor: float, stages: StageSetting
     """
     with DesignPool([design]) as pool:
         pool.prepare()
-        dataset = Dataset.of_pool(pool, Weights(fit=design.fit_weight))
+        dataset = Dataset.of_pool(pool, Weights.suiting([design]))
         search = Stages(dataset, kit.sizes, replace(stages, schedule=(factor * design.fit_weight,), rescues=0))
         direct = search.direct(kit)
         relaxed, built = search.to_parts(search.relaxed(kit, fixed_kit=True), fixed_kit=True)

@@ -36,7 +36,7 @@ def slit_kit(designs: Sequence[Design], m: int, penalty: float | None, *, restar
     kind = "linear" if penalty is None else "slit"
     with DesignPool(designs, jobs) as pool:
         pool.prepare()
-        dataset = Dataset.of_pool(pool, Weights(fit=max(design.fit_weight for design in designs)))
+        dataset = Dataset.of_pool(pool, Weights.suiting(designs))
         q = dataset.parameters
         groups = [ElementGroup(kind, group.indices) for group in dataset.groups if group.kind == "linear"]
         scale = collect(groups, q)[kind].scale

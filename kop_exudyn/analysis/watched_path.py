@@ -52,7 +52,7 @@ def watch_one(design: Design, parts: dict[str, int], settings: StageSettings,
     """
     with DesignPool([design]) as pool:
         pool.prepare()
-        dataset = Dataset.of_pool(pool, Weights(fit=design.fit_weight))
+        dataset = Dataset.of_pool(pool, Weights.suiting([design]))
         stages = Stages(dataset, parts, settings)
         relaxed = stages.relaxed(stages.direct().kit)
         return watch(dataset, relaxed, settings.path_steps)[0], relaxed

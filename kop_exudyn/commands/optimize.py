@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from .output import add_json, report
-from .values import design_selection, not_negative, part_counts, positive
+from .values import design_selection, not_negative, part_counts, positive, term_weights
 
 HELP = "find one kit of parts for several designs"
 DESCRIPTION = """Finds one kit of parts from which all designs of a folder, or of a study file, can be built. DIR gets
@@ -21,7 +21,8 @@ EXAMPLES = """examples:
   kop optimize models/conformals --designs 3 --parts linear=12,angular=5 --out out/kit
   kop optimize models/conformals --designs 02_tanh,07_log --parts linear=8,angular=3 --out out/pair
   kop optimize models/conformals --parts linear=12,angular=5 --out out/kit --resume
-  kop optimize study.toml --out out/kit --seed 1"""
+  kop optimize study.toml --out out/kit --seed 1
+  kop optimize models/conformals --designs 06_moebius --kit out/kit/kit.json --out out/another"""
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,6 +30,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
                         help="folder of design files, or a study file (.toml)")
     parser.add_argument("--parts", type=part_counts, metavar="KIND=N,...",
                         help="how many parts of each kind, as linear=12,angular=5 (default: what the study says)")
+    parser.add_argument("--kit", type=Path, metavar="FILE",
+                        help="build the designs from this kit (a kit.json), whose parts stay as they are")
+    parser.add_argument("--weights", type=term_weights, metavar="TERM=W,...",
+                        help="of the objective's terms, as energy=0.05,stress=0.1 (terms: fit, energy, stress, share of "
+                        "the joints' own places in fit)")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the results")
     parser.add_argument("--designs", type=design_selection, metavar="N|NAMES",
                         help="the first N designs, or names of files without .json (default: all)")
@@ -52,19 +58,25 @@ def run(args: argparse.Namespace) -> int:
     from dataclasses import replace
 
     from ..errors import InputError
+    from ..io.kits import load_kit
     from ..io.studies import load_study
+    from ..optimize.objective import Weights
     from ..report.environment import usable_cores
     from ..report.kit_run import optimize_kit
 
     study = load_study(args.folder, args.designs)
-    parts = {_singular(kind): count for kind, count in (args.parts or study.parts).items()}
+    if args.kit is not None and args.parts:
+        raise InputError("a kit says how many parts there are: give --kit or --parts", field="--parts", value=args.parts)
+    kit = None if args.kit is None else load_kit(args.kit)
+    parts = kit.sizes if kit is not None else {_singular(k): count for k, count in (args.parts or study.parts).items()}
     if not parts:
-        raise InputError("says nothing of the parts: --parts is required", source=args.folder)
-    study = replace(study, settings=replace(study.settings, **_given(args)))
+        raise InputError("says nothing of the parts: --parts or --kit is required", source=args.folder)
+    Weights.of(args.weights or {})  # names that aren't terms are found before anything is read
+    study = replace(study, settings=replace(study.settings, **_given(args)), weights=study.weights | (args.weights or {}))
     designs = study.designs()
     result = optimize_kit(designs, parts, out=args.out, inputs=study.files, resume=args.resume,
                           settings=study.job_settings(designs, args.jobs or usable_cores()), overwrite=args.overwrite,
-                          progress=not args.quiet)
+                          progress=not args.quiet, kit=kit)
     failed = [design.name for n, design in enumerate(result.designs) if "failed" in result.summary("assigned", n)]
     page = args.out / "index.html"
     report(args, {

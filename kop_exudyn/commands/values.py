@@ -18,6 +18,20 @@ def part_counts(text: str) -> dict[str, int]:
     return counts
 
 
+def term_weights(text: str) -> dict[str, float]:
+    """``fit=1e4,energy=0.05`` as {"fit": 1e4, "energy": 0.05}; whether there are such terms is checked later."""
+    weights: dict[str, float] = {}
+    for piece in text.split(","):
+        name, equals, number = (part.strip() for part in piece.partition("="))
+        value = _numbers(number, (1,))
+        if not name or not equals or not value:
+            raise argparse.ArgumentTypeError(f"expected TERM=WEIGHT,..., got {piece!r}")
+        if name in weights:
+            raise argparse.ArgumentTypeError(f"the term {name!r} is given twice")
+        weights[name] = value[0]
+    return weights
+
+
 def design_selection(text: str) -> int | list[str]:
     """``3`` as 3, the first three designs; ``a,b`` as ["a", "b"], their names."""
     try:

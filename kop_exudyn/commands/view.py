@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -38,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     from ..report.viewer import save_viewer
 
     check_output_file(args.out, overwrite=args.overwrite)
-    page = _kit(args) if args.what.is_dir() else _design(args)
+    page = _kit(args) if os.path.isdir(args.what) else _design(args)
     path = save_viewer(args.out, page, overwrite=args.overwrite)
     report(args, {"page": path}, f"{path}\n")
     return 0

@@ -19,6 +19,7 @@ from .system import System
 
 # Relative residual of the linear solves beyond which derivatives are worthless.
 _TRUSTED_RESIDUAL = 1e-6
+_CHUNK = 256  # elements at a time, to bound memory
 
 
 class Sensitivities:
@@ -91,8 +92,27 @@ class Sensitivities:
         kept = self.system.sparsity.kept[dofs]
         load = np.zeros(self._n + self.system.sparsity.n_driven)
         np.add.at(load, kept[kept >= 0], np.asarray(cotangent, float)[kept >= 0])
-        multiplier, _ = bordered_solve(self.system, self._border, load[: self._n])
-        return -(self._residual_q.T @ multiplier) + self._driven_map.T @ load[self._n:]
+        return self._by_load(load)
+
+    # -- stresses --------------------------------------------------------------------------------------------------
+    @cached_property
+    def stresses(self) -> np.ndarray:
+        """Derivatives (E, 6, n_parameters) of the elements' generalised stresses; memory E x 6 x n_parameters."""
+        scene, s = self.system.scene, self.system.sparsity
+        kept = np.concatenate([self.full, self._driven_map.toarray(), np.zeros((1, scene.n_parameters))])
+        out = np.empty((len(scene.elements), 6, scene.n_parameters))
+        factor = self._B * (scene.stiffness / self.system.lengths[:, None])[:, :, None]
+        for first in range(0, len(out), _CHUNK):  # absent unknowns (-1) read the row of zeros
+            some = slice(first, first + _CHUNK)
+            np.matmul(factor[some], kept[s.rows[some]], out=out[some])
+        has = self._has
+        out[has, :, scene.length_parameter[has]] += self._stress_L[has] * scene.length_factor[has][:, None]
+        return out
+
+    def stress_adjoint(self, cotangent: np.ndarray) -> np.ndarray:
+        """Gradient (n_parameters,) of J given dJ/d(generalised stresses) (E, 6): one solve, no x_q."""
+        explicit = np.einsum("er,er->e", self._stress_L, cotangent)
+        return self._by_parameter(explicit) + self._by_load(self._scattered(cotangent))
 
     # -- energies --------------------------------------------------------------------------------------------------
     @cached_property
@@ -106,10 +126,7 @@ class Sensitivities:
         """d(elastic energy)/dq (n_parameters,), the work of loads and actuators taken out by one adjoint solve."""
         if not self._loaded:
             return self.potential_gradient
-        gradient = self._elastic_gradient()
-        multiplier, _ = bordered_solve(self.system, self._border, gradient[: self._n])
-        return (self._by_parameter(self._energy_L) + self._driven_map.T @ gradient[self._n:]
-                - self._residual_q.T @ multiplier)
+        return self._by_parameter(self._energy_L) + self._by_load(self._elastic_gradient())
 
     @cached_property
     def potential_hessian(self) -> np.ndarray:
@@ -233,11 +250,19 @@ class Sensitivities:
         x = scene.node_poses(self.equilibrium.state)[0]
         return -0.5 * np.einsum("ei,ei->e", scene.weight, x[scene.elements[:, 0]] + x[scene.elements[:, 1]])
 
+    def _by_load(self, load: np.ndarray) -> np.ndarray:
+        """Gradient (n_parameters,) of J by way of the state, given dJ/d(kept unknowns)."""
+        multiplier, _ = bordered_solve(self.system, self._border, load[: self._n])
+        return self._driven_map.T @ load[self._n:] - self._residual_q.T @ multiplier
+
     def _elastic_gradient(self) -> np.ndarray:
         """d(elastic energy)/d(kept unknowns) at the equilibrium."""
+        return self._scattered(self._strain)
+
+    def _scattered(self, values: np.ndarray) -> np.ndarray:
+        """B^T C v summed into the kept unknowns, for v (E, 6) and the elements' stiffnesses C = stiffness / length."""
         s, scene = self.system.sparsity, self.system.scene
-        stress = scene.stiffness * self._strain / self.system.lengths[:, None]
-        block = np.einsum("eri,er->ei", self._B, stress)
+        block = np.einsum("eri,er->ei", self._B, scene.stiffness * values / self.system.lengths[:, None])
         keep = s.rows >= 0
         return np.bincount(s.rows[keep], block[keep], minlength=s.n_free + s.n_driven)
 

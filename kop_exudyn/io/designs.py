@@ -1,6 +1,7 @@
 """Design files: JSON in the format "kop_exudyn/design", one design a file, a dataset a folder or a study file."""
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import Iterable, Sequence
@@ -62,10 +63,14 @@ def load_all(files: Iterable[Path], source: str | Path) -> list[Design]:
 def design_files(folder: str | Path) -> list[Path]:
     """The design files of a folder, in natural order. Raises InputError when there is none."""
     folder = Path(folder)
-    if not folder.is_dir():
-        raise InputError("is a file, expected a folder of designs" if folder.exists() else "no such folder",
+    if not os.path.isdir(folder):
+        raise InputError("is a file, expected a folder of designs" if os.path.exists(folder) else "no such folder",
                          source=folder)
-    found = [path for path in folder.iterdir() if path.name.endswith(_SUFFIXES) and not path.name.startswith(".")]
+    try:
+        names = os.listdir(folder)
+    except OSError as error:
+        raise InputError(f"can't be read: {(error.strerror or str(error)).lower()}", source=folder) from None
+    found = [folder / name for name in names if name.endswith(_SUFFIXES) and not name.startswith(".")]
     if not found:
         raise InputError("contains no designs (files that end in .json or .json.gz)", source=folder)
     return sorted(found, key=_natural)

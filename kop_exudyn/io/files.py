@@ -1,4 +1,7 @@
-"""Files: bounded reading, atomic writing, and knowing before a long computation that its output can be written."""
+"""Files: bounded reading, atomic writing, and knowing before a long computation that its output can be written.
+
+What a path is, is asked of os.path: pathlib's questions raise OSError for names that are too long.
+"""
 from __future__ import annotations
 
 import gzip
@@ -80,11 +83,11 @@ def write_text(path: str | Path, text: str, *, overwrite: bool = False) -> Path:
 def check_output_file(path: str | Path, *, overwrite: bool = False) -> None:
     """Raise InputError unless this file could be written now; its folder must exist."""
     path = Path(path)
-    if path.is_dir():
+    if os.path.isdir(path):
         raise InputError("is a folder, expected a file to write", source=path)
-    if path.exists() and not overwrite:
+    if os.path.exists(path) and not overwrite:
         raise InputError("exists already", source=path)
-    if not path.parent.is_dir():
+    if not os.path.isdir(path.parent):
         raise InputError("can't be written: its folder doesn't exist", source=path)
 
 

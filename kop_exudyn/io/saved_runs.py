@@ -72,7 +72,7 @@ def _all(outcomes: Sequence[Outcome | None]) -> list[Outcome] | None:
 def _weights(settings: Mapping[str, Any], designs: Sequence[Design]) -> Weights:
     """The weights that the run was made with; those of its designs' class where it says nothing."""
     given = settings.get("weights")
-    return Weights(**given) if given else Weights(fit=max(design.fit_weight for design in designs))
+    return Weights.of(given) if given else Weights.suiting(designs)
 
 
 def _history(data: Mapping[str, Any], path: Path) -> list[StageEvent]:

@@ -1,6 +1,7 @@
 """Study files: TOML in the format "kop_exudyn/study", which says for what designs a kit is sought, and how."""
 from __future__ import annotations
 
+import os
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -49,9 +50,7 @@ class Study:
 
     def job_settings(self, designs: Sequence[Design], jobs: int) -> JobSettings:
         """Settings of a job for these designs, which are the study's own, with that many processes."""
-        weights = None
-        if self.weights:
-            weights = Weights(**{"fit": max(design.fit_weight for design in designs), **self.weights})
+        weights = Weights.suiting(designs, self.weights) if self.weights else None
         counts = self.counts if set(self.counts) - {1.0} else None
         return JobSettings(weights, counts, self.settings, jobs, self.baselines)
 
@@ -74,7 +73,7 @@ def load_study(path: str | Path, select: int | Sequence[str] | None = None) -> S
 def is_study(path: str | Path) -> bool:
     """Whether this would be a study's file, and no folder of designs."""
     path = Path(path)
-    return path.suffix.lower() == STUDY_SUFFIX and not path.is_dir()
+    return path.suffix.lower() == STUDY_SUFFIX and not os.path.isdir(path)
 
 
 def _from_file(path: Path) -> Study:
@@ -85,6 +84,10 @@ def _from_file(path: Path) -> Study:
     weights = data.get("weights", {})
     if weights.get("fit") == 0 and weights.get("energy") == 0:
         raise InputError("fit and energy can't both be 0", source=path, field="weights", value=weights)
+    try:
+        Weights.of(weights)
+    except InputError as error:
+        raise error.at(path) from None
     counts = _files(data["designs"], path)
     settings = dict(data.get("settings", {}))
     if "schedule" in settings:
@@ -110,9 +113,9 @@ def _files(entries: Sequence[str | Mapping[str, Any]], path: Path) -> dict[Path,
     for n, entry in enumerate(entries):
         name, weight = (entry, 1.0) if isinstance(entry, str) else (entry["file"], float(entry.get("weight", 1.0)))
         place = path.parent / name
-        if not place.exists():
+        if not os.path.exists(place):
             raise InputError("no such file or folder", source=path, field=f"designs[{n}]", value=name)
-        for file in design_files(place) if place.is_dir() else [place]:
+        for file in design_files(place) if os.path.isdir(place) else [place]:
             if file.name in {other.name for other in found}:
                 raise InputError("two design files have the same name", source=path, field=f"designs[{n}]",
                                  value=file.name)

@@ -69,7 +69,7 @@ def run_job(
     with DesignPool(designs, settings.jobs) as pool:
         announce("input designs")
         pool.prepare()
-        weights = settings.weights or Weights(fit=max(design.fit_weight for design in designs))
+        weights = settings.weights or Weights.suiting(designs)
         dataset = Dataset.of_pool(pool, weights, settings.design_weights)
         stages = Stages(dataset, parts, settings.stages, store, observer)
         outcome = JobOutcome(pool.references)

@@ -1,24 +1,25 @@
 """Design preservation: how far a design with changed parameters is from the design that was wanted.
 
-F(q) = beta T / l0^2 + gamma sum_roles E / E0, with T the target fitting of the deployed joints at the best rigid
+F(q) = beta T / l0^2 + gamma sum_roles E / E0 + ..., with T the target fitting of the deployed joints at the best rigid
 placement, E the elastic energies (deployed, and assembled where the class has such a state), l0 the target's
 bounding-box diagonal and E0 the input design's deployed energy: every term is divided by its own scale, so F doesn't
-change with units.
+change with units. The terms are the modules of `terms/`.
 """
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Mapping
+from typing import Mapping, Sequence
 
 import numpy as np
 
 from ..equilibrium.exudyn_model import Confirmation, ExudynModel
 from ..equilibrium.newton import Equilibrium, NewtonOptions, Start, refine, solve
 from ..equilibrium.sensitivities import Sensitivities
-from ..errors import SimulationFailure
-from ..structures.base import Design, Target
+from ..errors import InputError, SimulationFailure
+from ..structures.base import Design
 from .fitting import FitResult, TargetFitting
+from .terms.base import Reference, term_class
 
 # A trial point that takes longer than this is better met by a shorter step.
 _TRIAL = NewtonOptions(max_iterations=80)
@@ -31,25 +32,40 @@ class Weights:
     fit : beta, on T / l0^2
     energy : gamma, on E / E0
     share : of the target positions in T; the rest is closest points
+    others : (name, weight) of other terms, see the modules of `terms/`; `Weights.of` takes all by name
+
+    Raises InputError for unknown terms, and for weights that are negative or not finite.
     """
 
     fit: float = 1e4
     energy: float = 0.02
     share: float = 0.1
+    others: tuple[tuple[str, float], ...] = ()
 
+    def __post_init__(self) -> None:
+        for name, weight in self.of_terms().items():
+            term_class(name)
+            if not (isinstance(weight, (int, float)) and 0 <= weight < float("inf")):
+                raise InputError("a weight is a finite number, not negative", field=f"weights.{name}", value=weight)
 
-@dataclass(frozen=True)
-class Reference:
-    """What a design is compared with, from its input parameters.
+    @classmethod
+    def of(cls, values: Mapping[str, float]) -> Weights:
+        """Weights by the names of the terms (and "share"); those not given have their defaults."""
+        own = {name: values[name] for name in ("fit", "energy", "share") if name in values}
+        return cls(**own, others=tuple(sorted((name, weight) for name, weight in values.items() if name not in own)))
 
-    target : the shape to keep
-    energy : E0, the input design's elastic energy in the fitted state
-    equilibria : of the input design, by role
-    """
+    @classmethod
+    def suiting(cls, designs: Sequence[Design], values: Mapping[str, float] | None = None) -> Weights:
+        """Weights with the fit weight that suits the designs' class (see `Design.fit_weight`), unless values say else."""
+        return cls.of({"fit": max(design.fit_weight for design in designs), **(values or {})})
 
-    target: Target
-    energy: float
-    equilibria: Mapping[str, Equilibrium]
+    def of_terms(self) -> dict[str, float]:
+        """Weights by the terms' names."""
+        return {"fit": self.fit, "energy": self.energy, **dict(self.others)}
+
+    def to_dict(self) -> dict[str, float]:
+        """What `of` takes."""
+        return {"fit": self.fit, "energy": self.energy, "share": self.share, **dict(self.others)}
 
 
 @dataclass(frozen=True)
@@ -58,7 +74,7 @@ class Evaluation:
 
     q : (nq,)
     value : F
-    terms : its parts by name ("fit", and "energy ROLE")
+    terms : its weighted parts by name ("fit", "energy ROLE", ...)
     fit : target fitting of the joints
     equilibria : by role
     confirmations : Exudyn's, by role; empty until the point is kept
@@ -101,6 +117,8 @@ class DesignObjective:
         self.design, self.weights = design, weights
         self.reference = reference if reference is not None else reference_of(design)
         self._fitting = TargetFitting(self.reference.target, weights.share)
+        self._terms = [(term_class(name)(design, self.reference), weight)
+                       for name, weight in weights.of_terms().items() if weight]
         self._models: dict[str, ExudynModel] = {}
 
     def evaluate(self, q: np.ndarray, previous: Evaluation | None = None, options: NewtonOptions = _TRIAL) -> Evaluation:
@@ -133,16 +151,17 @@ class DesignObjective:
         gradient = np.zeros(len(evaluation.q))
         model = np.zeros((len(evaluation.q),) * 2) if hessian else None
         for role in self.design.roles:
-            if not (self.weights.energy or role.fitted and self.weights.fit):
+            terms = [(term, weight) for term, weight in self._terms if term.sees(role)]
+            if not terms:
                 continue
             sensitivities = Sensitivities(self.design.systems[role.name], evaluation.equilibria[role.name])
-            if role.fitted and self.weights.fit:
-                self._add_fit(sensitivities, evaluation.fit, gradient, model)
-            if self.weights.energy:
-                scale = self.weights.energy / self.reference.energy
-                gradient += scale * sensitivities.energy_gradient
-                if model is not None:
-                    model += scale * sensitivities.energy_hessian
+            for term, weight in terms:
+                if model is None:
+                    gradient += weight * term.gradient(role, sensitivities, evaluation.fit)
+                else:
+                    slope, curvature = term.model(role, sensitivities, evaluation.fit)
+                    gradient += weight * slope
+                    model += weight * curvature
         seconds = {"exudyn": exudyn_s, "sensitivities": perf_counter() - begin}
         return DesignDerivatives(gradient, model, evaluation, seconds)
 
@@ -190,29 +209,13 @@ class DesignObjective:
         role = self.design.fitted_role.name
         joints = equilibria[role].state.positions[self.design.joints]
         fit = self._fitting(joints)
-        terms = {}
-        if self.weights.fit:
-            terms["fit"] = self.weights.fit * fit.value / self.reference.target.diagonal**2
-        if self.weights.energy:
-            for name, eq in equilibria.items():
-                terms[f"energy {name}"] = self.weights.energy * eq.elastic_energy / self.reference.energy
+        terms = {term.label(role): weight * term.value(role, equilibria[role.name], fit)
+                 for term, weight in self._terms for role in self.design.roles if term.sees(role)}
         value = float(sum(terms.values()))
         if not np.isfinite(value):
             raise SimulationFailure("the objective is not a finite number", where=self.design.name)
         return Evaluation(np.array(q), value, terms, fit, equilibria, {},
                           sum(eq.iterations for eq in equilibria.values()), len(equilibria))
-
-    def _add_fit(self, sensitivities: Sensitivities, fit: FitResult, gradient: np.ndarray,
-                 model: np.ndarray | None) -> None:
-        scale = self.weights.fit / self.reference.target.diagonal**2
-        if model is None:
-            dofs = (6 * self.design.joints[:, None] + np.arange(3)).ravel()
-            gradient += scale * sensitivities.adjoint(dofs, fit.gradient.ravel())
-            return
-        positions_q = sensitivities.positions(self.design.joints)
-        gradient += scale * (positions_q.T @ fit.gradient.ravel())
-        rows = fit.weighted_rows(positions_q)
-        model += scale * (rows.T @ rows)
 
 
 def reference_of(design: Design) -> Reference:

@@ -19,6 +19,7 @@ from ..errors import InputError
 from ..io.checkpoint import Job
 from ..io.run_folder import RunFolder
 from ..kit.cluster import cluster
+from ..kit.parts import Kit
 from ..optimize.job import JobSettings, run_job
 from ..optimize.stage_results import StageEvent
 from ..structures.base import Design
@@ -28,10 +29,12 @@ from .kit_report import write_kit_report
 def optimize_kit(
     designs: Sequence[Design], parts: Mapping[str, int], *, out: str | Path, settings: JobSettings = JobSettings(),
     inputs: Sequence[str | Path] = (), resume: bool = False, overwrite: bool = False, progress: bool = False,
+    kit: Kit | None = None,
 ) -> KitResult:
     """Find a kit for these designs; write checkpoints on the way, and results and a report in the end.
 
     parts : kind -> number of parts
+    kit : build the designs from this one, whose parts stay as they are (`parts` are then its sizes)
     out : folder for all files; see `RunFolder` for what it may hold
     inputs : files that the designs were read from; a run is resumed only while they are the same
     resume : go on from the checkpoints in `out`
@@ -40,8 +43,11 @@ def optimize_kit(
     SimulationFailure when an input design can't be simulated.
     """
     begin = perf_counter()
-    _check_request(designs, parts, settings)
-    described = described_job(designs, parts, settings)
+    if kit is not None:
+        _check_kit(designs, kit)
+    else:
+        _check_request(designs, parts, settings)
+    described = described_job(designs, parts, settings) | ({"kit": kit.to_dict()} if kit is not None else {})
     job = described if inputs else described | {"parameters": {d.name: _digest(d.parameters) for d in designs}}
     folder = RunFolder.open(out, Job.of(job, inputs), resume=resume, overwrite=overwrite)
     events: list[StageEvent] = []
@@ -51,7 +57,7 @@ def optimize_kit(
             bar.set_postfix_str(f"{event.sqp}: J = {event.record.value:.4g}", refresh=False)
             bar.update()
 
-        outcome = run_job(designs, parts, settings, folder.store, observe, bar.set_description_str)
+        outcome = run_job(designs, parts, settings, folder.store, observe, bar.set_description_str, kit)
     result = KitResult(
         list(designs), outcome.references, outcome.stages, events, outcome.equilibria, outcome.newton_iterations,
         perf_counter() - begin, outcome.peak_memory_mb, described | {"jobs": settings.jobs},
@@ -71,10 +77,20 @@ def _check_request(designs: Sequence[Design], parts: Mapping[str, int], settings
     cluster(groups, q, parts, bounds=settings.stages.bounds, restarts=1)
 
 
+def _check_kit(designs: Sequence[Design], kit: Kit) -> None:
+    """Raise InputError where a design has elements of a kind that the kit lacks."""
+    for design in designs:
+        for kind in dict.fromkeys(group.kind for group in design.groups):
+            if kind not in kit.sizes:
+                raise InputError(f"the kit has no {kind} parts, which {design.name} is made of", field="kit",
+                                 value=", ".join(kit.sizes))
+
+
 def described_job(designs: Sequence[Design], parts: Mapping[str, int], settings: JobSettings) -> dict[str, Any]:
     """All that the result depends on, as plain data; the number of processes is not part of it."""
     constraints = settings.stages.constraints
     values = asdict(replace(settings, stages=replace(settings.stages, constraints=None)))
+    values["weights"] = settings.weights and settings.weights.to_dict()
     if constraints is not None:
         rows = sp.csr_array(constraints.A)
         rows.sort_indices()

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any, Iterator, Mapping, Sequence
 
@@ -20,7 +21,7 @@ def read_mesh(path: Path, field: str = "surface.file") -> tuple[np.ndarray, np.n
     suffix = path.suffix.lower()
     if suffix not in MESH_SUFFIXES:
         raise InputError(f"is no mesh file (known: {', '.join(MESH_SUFFIXES)})", field=field, value=path.name)
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise InputError("no such file", field=field, value=str(path))
     try:
         vertices, faces = _compas_mesh(path) if suffix == COMPAS else _trimesh(path, field)

@@ -44,6 +44,7 @@ baselines = false
 parts = {linear = 12, angular = 5}
 [weights]
 energy = 0.05
+stress = 0.5
 [settings]
 schedule = [1000, 1e5]
 seed = 3
@@ -61,7 +62,7 @@ bounds.angular = {upper = 1.5}
     designs = found.designs()
     assert [design.name for design in designs] == ["two", "one", "more four", "more three"]
     job = found.job_settings(designs, 2)
-    assert job.weights == Weights(fit=designs[0].fit_weight, energy=0.05) and job.design_weights == (1, 2, 1, 1)
+    assert job.weights == Weights(fit=designs[0].fit_weight, energy=0.05, others=(("stress", 0.5),)) and job.design_weights == (1, 2, 1, 1)
     assert (job.jobs, job.stages) == (2, settings)
 
 
@@ -90,7 +91,7 @@ def test_the_schema_knows_all_settings(repository):
     schema = json.loads((repository / "kop_exudyn" / "io" / "schemas" / "study.schema.json").read_text())
     known = set(schema["properties"]["settings"]["properties"])
     assert known == {field.name for field in fields(StageSettings)} - {"constraints"}  # which are written in Python
-    assert set(schema["properties"]["weights"]["properties"]) == {field.name for field in fields(Weights)}
+    assert set(schema["properties"]["weights"]["properties"]) == {field.name for field in fields(Weights)} - {"others"}
 
 
 DESIGNS = 'designs = ["designs"]\n'
@@ -101,6 +102,7 @@ DESIGNS = 'designs = ["designs"]\n'
     ("", "designs: is missing"),
     ("designs = []", r"designs = \[\]: must have at least 1"),
     ('designs = ["no.json"]', r"designs\[0\] = 'no.json': no such file or folder"),
+    (f'designs = ["{"n" * 300}"]', r"designs\[0\] = 'nnn.*: no such file or folder"),  # too long for a file's name
     ('designs = ["designs/one.json", "designs"]', r"designs\[1\] = 'one.json': two design files have the same name"),
     ('designs = [{file = "designs", weigth = 2}]', r"designs\[0\].weigth: unknown field \(did you mean 'weight'\?\)"),
     ('designs = [{file = "designs", weight = 0}]', r"designs\[0\].weight = 0: must be positive"),
@@ -113,6 +115,8 @@ DESIGNS = 'designs = ["designs"]\n'
     (DESIGNS + '[settings]\nhessian = "none"', 'settings.hessian = \'none\': must be one of "exact", "bfgs"'),
     (DESIGNS + "[settings.bounds]\nlinear = {}", "settings.bounds.linear"),
     (DESIGNS + "[weights]\nfit = 0\nenergy = 0", "weights = .*: fit and energy can't both be 0"),
+    (DESIGNS + "[weights]\nstrength = 1", r"weights = 'strength': unknown term .*known: fit, energy, stress"),
+    (DESIGNS + "[weights]\nstress = -1", r"weights.stress = -1: must not be negative|weights.stress = -1"),
     (DESIGNS + "version = 1", "not TOML: Cannot overwrite a value"),
     ("designs = 2026-01-01", "designs = .*: must be a list"),
 ])

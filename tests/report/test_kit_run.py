@@ -10,6 +10,8 @@ from kop_exudyn.errors import InputError
 from kop_exudyn.io.checkpoint import CheckpointStore
 from kop_exudyn.io.kits import load_kit
 from kop_exudyn.io.results import load_result, load_states
+from kop_exudyn.io.saved_runs import load_run
+from kop_exudyn.kit.parts import Kit
 from kop_exudyn.optimize.job import JobSettings
 from kop_exudyn.optimize.stage_settings import StageSettings
 from kop_exudyn.report.kit_drawings import drawn_designs, histories, part_spaces
@@ -155,6 +157,22 @@ def test_killed_and_resumed_gives_the_same(finished, tmp_path, monkeypatch):
     first, second = (json.loads((folder / "result.json").read_text(), object_pairs_hook=lambda pairs: {
         key: value for key, value in pairs if key not in volatile}) for folder in (out, tmp_path / "out"))
     assert first == second
+
+
+def test_designs_from_a_kit_that_exists(finished, tmp_path):
+    """The parts stay as they are; the page and the saved run know of it."""
+    kit = load_kit(finished[1] / "kit.json")
+    result = optimize_kit(zigzags()[:1], kit.sizes, out=tmp_path / "out", settings=SETTINGS, kit=kit)
+    np.testing.assert_array_equal(result.kit.vector, kit.vector)
+    evaluation = result.stages["assigned"].designs[0]
+    assert "unrelaxed" not in result.stages and evaluation.confirmations
+    np.testing.assert_array_equal(result.stages["assigned"].assignment.realise(kit, evaluation.q), evaluation.q)
+    data = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
+    assert data["settings"]["kit"] == kit.to_dict() and data["kit"] == kit.to_dict()
+    assert load_run(tmp_path / "out", zigzags()[:1]).kit.to_dict() == kit.to_dict()
+    with pytest.raises(InputError, match="kit = 'linear': the kit has no angular parts, which zigzag 0 is made of"):
+        optimize_kit(zigzags()[:1], {"linear": 3}, out=tmp_path / "no", kit=Kit({"linear": kit["linear"]}))
+    assert not (tmp_path / "no").exists()
 
 
 def test_another_job_is_not_resumed(finished):
