@@ -19,12 +19,11 @@ from ..errors import InputError, SimulationFailure
 from ..scene.loads import DeadForces, Scaled, with_self_weight
 from ..scene.scene import Scene
 from ..structures.base import Design
-from ..structures.load_case import LoadCase
+from ..structures.load_case import LoadCase, hold_in_place
 from .strength import Strength, material_values, materials_of, rod_strength
 
 _STEPS = 4
 _LOWER = 0.5  # of the height: joints below are supports
-_STRAIGHT = 1e-3  # supports within this share of their extent from a line don't hold a structure
 _DOWN = np.array([0.0, 0.0, -1.0])  # where supports are looked for without gravity
 
 
@@ -113,18 +112,19 @@ def supports_of(design: Design, unloaded: Equilibrium, case: LoadCase) -> np.nda
     else:
         down = _DOWN if case.gravity is None or not case.gravity.any() else case.gravity
         found = _outermost(x, down / np.linalg.norm(down))
-    extents = np.linalg.svd(x[found] - x[found].mean(axis=0), compute_uv=False)
-    if len(found) < 3 or not extents[1] > _STRAIGHT * extents[0]:
+    if not hold_in_place(x[found]):
         raise InputError("supports on one line don't hold a structure", source=design.name, field="supports",
                          value=found.tolist())
     return found
 
 
 def _pinned_joints(design: Design) -> np.ndarray:
-    """Joints whose places the design's parameters prescribe."""
+    """Joints whose places the design itself prescribes, more than it takes to stop rigid motions."""
     scene = design.scene(design.fitted_role.name)
     dofs = scene.driven.dofs[scene.driven.dofs < 6 * scene.n_bodies]
-    return np.flatnonzero(np.isin(design.joints, dofs // 6))
+    kept = scene.pinned[: 6 * scene.n_bodies].reshape(-1, 6)[design.joints, :3].all(axis=1)
+    kept = kept if np.count_nonzero(kept) > 1 else np.zeros_like(kept)
+    return np.flatnonzero(np.isin(design.joints, dofs // 6) | kept)
 
 
 def _outermost(x: np.ndarray, down: np.ndarray) -> np.ndarray:

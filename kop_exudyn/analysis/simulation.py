@@ -1,6 +1,7 @@
 """One design simulated: its final state, confirmed by Exudyn, and how well it fits its target."""
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -17,6 +18,10 @@ from ..structures.load_case import LoadCase
 from .loading import LoadedState, loaded_state
 from .strength import strength_summary
 
+log = logging.getLogger(__name__)
+
+_FAR_AWAY = 10.0  # % of the target's box diagonal
+_SLID = 5.0  # times the deviation: what isn't on the surface any more needs no such warning
 
 @dataclass(frozen=True)
 class SimulationResult:
@@ -46,6 +51,14 @@ class SimulationResult:
         """The equilibrium that the design is made for."""
         return self.equilibria[self.design.fitted_role.name]
 
+    @property
+    def displaced_percent(self) -> float:
+        """Largest distance of a joint from its own place in the target, % of the target's bounding-box diagonal.
+
+        Deviations are distances from the surface: a grid that shears, or closes, may slide along it.
+        """
+        return 100 * float(self.fit.displacements.max()) / self.fit.diagonal
+
     def to_dict(self) -> dict[str, Any]:
         """As `kop simulate --json` prints it.
 
@@ -59,6 +72,7 @@ class SimulationResult:
             "elastic_energy": final.elastic_energy, "stable": final.stable, "opening_angle": final.opening,
             "exudyn": self.confirmations[self.design.fitted_role.name].to_dict(),
             "fit": {"max_percent": self.fit.max_percent, "mean_percent": self.fit.mean_percent},
+            "displaced_percent": self.displaced_percent,
             "strength": strength_summary(self.design, self.equilibria),
             **({"loaded": self.loaded.to_dict()} if self.loaded is not None else {}),
             "joints": self.joints.tolist(),
@@ -90,6 +104,10 @@ def simulate(design: Design, loads: LoadCase | None = None) -> SimulationResult:
     fit = TargetFitting(target)(confirmations[role].state.positions[design.joints])
     system = design.systems[role]
     loaded = None if loads.empty else loaded_state(design, equilibria[role], loads)
-    return SimulationResult(
+    result = SimulationResult(
         design, system.n_unknowns, len(system.scene.elements), sum(eq.iterations for eq in equilibria.values()), wall_s,
         equilibria, confirmations, fit, joints, loaded)
+    if result.displaced_percent > max(_FAR_AWAY, _SLID * fit.max_percent):
+        log.warning("%s: on the surface, but joints end up to %.3g %% of its box diagonal away from their places: the "
+                    "structure hardly resists that motion", design.name, result.displaced_percent)
+    return result

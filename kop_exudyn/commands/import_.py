@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from .output import add_json, report
-from .values import angle, number_pair, patch, positive_number
+from .values import angle, held_joints, number_pair, patch, positive_number
 
 HELP = "turn a drawing, a surface or a released umbrella mesh into a design file"
 DESCRIPTION = """Writes a design file from
@@ -44,6 +44,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
                        "assembly to deployment, in radians or as 35deg")
     shell.add_argument("--surface", type=Path, metavar="MESH", help="mesh (.obj, .ply, .stl, COMPAS .json) that the "
                        "grid lies on, above the drawing in the z direction")
+    shell.add_argument("--held", type=held_joints, metavar="JOINTS", help="of a grid: joints that keep their places on the "
+                       "surface, \"corners\", \"boundary\" or numbers (default: none; domes need some)")
     shell.add_argument("--section", type=number_pair, metavar="WIDTH,HEIGHT", help="of the rods: across the normal of "
                        "the plane or surface, and along it")
     shell.add_argument("--material", type=number_pair, metavar="YOUNG,POISSON", help="Young's modulus and Poisson's ratio")
@@ -109,7 +111,7 @@ def _grid(args: argparse.Namespace) -> dict[str, Any]:
                          value=None if args.free_ends else args.scale)
     curves = read_network(args.file, args.layer, kind=args.curves)
     surface = Path(relpath(args.surface, args.out.parent)).as_posix()
-    data = grid_data(args.file.stem, curves, _section(args), _material(args), surface)
+    data = grid_data(args.file.stem, curves, _section(args), _material(args), surface, args.held)
     try:
         design_from_dict(data, str(args.out))  # the surface's path is relative to the design's file
     except InputError as error:

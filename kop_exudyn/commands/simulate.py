@@ -58,6 +58,7 @@ def _summary(result: dict) -> str:
         "design": result["design"],
         "model": f"{result['elements']:,} elements, {result['unknowns']:,} unknowns",
         "deviation": f"max {fit['max_percent']:.3g} %, mean {fit['mean_percent']:.3g} % of the target's box diagonal",
+        "displacement": f"max {result['displaced_percent']:.3g} % from the joints' own places",
         "elastic energy": f"{result['elastic_energy']:.6g}",
         "stable": "yes" if result["stable"] else "no",
         "solved in": f"{result['wall_s']:.2f} s, {result['newton_iterations']} Newton iterations",

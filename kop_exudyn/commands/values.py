@@ -70,6 +70,13 @@ def number_pair(text: str) -> tuple[float, float]:
     return values[0], values[1]
 
 
+def held_joints(text: str) -> str | list[int]:
+    """``0,4,20`` as [0, 4, 20], a word as it is; which words and joints there are is checked later."""
+    if text.isidentifier():
+        return text
+    return [_whole(number.strip(), 0, "the number of a joint") for number in text.split(",")]
+
+
 def patch(text: str) -> tuple[str, list[int]]:
     """``parallelogram,4,5`` as ("parallelogram", [4, 5]); which shapes there are is checked later."""
     shape, *counts = (piece.strip() for piece in text.split(","))

@@ -49,14 +49,17 @@ def c_shell_data(name: str, curves: Sequence[Mapping[str, Any]], section: Mappin
 
 
 def grid_data(name: str, curves: Sequence[Mapping[str, Any]], section: Mapping[str, Any],
-              material: Mapping[str, Any], surface: str) -> dict[str, Any]:
+              material: Mapping[str, Any], surface: str, held: str | Sequence[int] | None = None) -> dict[str, Any]:
     """The content of a grid's design file, see grid.schema.json: curves in plan on the mesh of a file.
 
     surface : path of the mesh, relative to the design file
+    held : joints that keep their places, see `Grid`
     """
     data = {"format": "kop_exudyn/design", "version": DESIGN_VERSION, "class": "grid", "name": name,
             "material": dict(material), "section": dict(section), "surface": {"type": "mesh", "file": surface},
             "network": {"type": "curves", "curves": list(curves)}}
+    if held is not None:
+        data["held"] = held
     check_schema(data, "grid")
     return data
 

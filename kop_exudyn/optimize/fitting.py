@@ -45,6 +45,7 @@ class FitResult:
     gradient : (n, 3) dT/dx in the coordinates that the joints were given in
     placement : the best one
     distances : (n,) of the placed joints from the surface
+    displacements : (n,) of the placed joints from their own places in the target
     diagonal : length that percentages refer to
     blocks : (n, 3, 3) square root of the Hessian of T in each placed joint
     motions : (3n, r) orthonormal basis of the weighted residual rows' change by rigid motions
@@ -54,6 +55,7 @@ class FitResult:
     gradient: np.ndarray
     placement: Placement
     distances: np.ndarray
+    displacements: np.ndarray
     diagonal: float
     blocks: np.ndarray
     motions: np.ndarray
@@ -84,6 +86,9 @@ class FitResult:
         return factor.T @ factor
 
 
+_Placed = tuple[np.ndarray, Closest, float, np.ndarray]  # joints (n, 3), closest points, T, dT/dy (n, 3)
+
+
 class TargetFitting:
     """Compares joints with a target; the search tree of the surface is built once.
 
@@ -109,15 +114,16 @@ class TargetFitting:
         if x.shape != self.positions.shape or not np.isfinite(x).all():
             raise InputError(f"expected {len(self.positions)} finite joints", field="joints", value=x.shape)
         placement = placement or best_placement(x, self.positions, self.weights)
+        found = self._evaluate(x, placement)
         for _ in range(_MAX_ITERATIONS):
-            placement, step = self._newton_step(x, placement)
+            placement, found, step = self._newton_step(x, placement, found)
             if step <= _STEP_TOLERANCE:
                 break
-        return self._result(x, placement)
+        return self._result(placement, found)
 
-    def _newton_step(self, x: np.ndarray, placement: Placement) -> tuple[Placement, float]:
-        """One safeguarded Newton step of the placement, and its length relative to the joints' size."""
-        y, closest, value, gradient = self._evaluate(x, placement)
+    def _newton_step(self, x: np.ndarray, placement: Placement, found: _Placed) -> tuple[Placement, _Placed, float]:
+        """One safeguarded Newton step of the placement, what is found there, and its length relative to the size."""
+        y, closest, value, gradient = found
         centre, size, motions = self._motions(y)
         slope = motions.T @ gradient.ravel()
         hessian = self._placement_hessian(y - centre, closest, gradient, size, motions)
@@ -127,12 +133,13 @@ class TargetFitting:
             turn, shift = fraction * step[:3] / size, fraction * step[3:]
             trial = placement.moved(centre, turn, shift)
             bound = value * (1 + 1e-14) + 1e-4 * fraction * float(slope @ step)
-            if self._evaluate(x, trial)[2] <= bound:
-                return trial, fraction * float(np.linalg.norm(step)) / size
+            there = self._evaluate(x, trial)
+            if there[2] <= bound:
+                return trial, there, fraction * float(np.linalg.norm(step)) / size
             fraction *= 0.5
-        return placement, 0.0
+        return placement, found, 0.0
 
-    def _evaluate(self, x: np.ndarray, placement: Placement) -> tuple[np.ndarray, Closest, float, np.ndarray]:
+    def _evaluate(self, x: np.ndarray, placement: Placement) -> _Placed:
         """Placed joints, closest points, T and dT/dy (n, 3)."""
         y = placement.apply(x)
         closest = self.surface.closest(y)
@@ -165,15 +172,15 @@ class TargetFitting:
         root = np.sqrt(self.share) * closest.derivative + normal
         return np.sqrt(2 * self.weights)[:, None, None] * root
 
-    def _result(self, x: np.ndarray, placement: Placement) -> FitResult:
-        y, closest, value, gradient = self._evaluate(x, placement)
+    def _result(self, placement: Placement, found: _Placed) -> FitResult:
+        y, closest, value, gradient = found
         blocks = self._blocks(closest)
         motions = self._motions(y)[2].reshape(-1, 3, 6)
         rows = np.einsum("nij,njk->nik", blocks, motions).reshape(-1, 6)
         basis, sizes, _ = np.linalg.svd(rows, full_matrices=False)
         basis = basis[:, sizes > _DEGENERATE * sizes[0]]
         return FitResult(value, gradient @ placement.rotation, placement, np.sqrt(closest.squared_distances),
-                         self.diagonal, blocks, basis)
+                         np.linalg.norm(y - self.positions, axis=1), self.diagonal, blocks, basis)
 
 
 def best_placement(x: np.ndarray, positions: np.ndarray, weights: np.ndarray) -> Placement:

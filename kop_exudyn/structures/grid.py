@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Mapping, TYPE_CHECKING
+from typing import Any, Mapping, Sequence, TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ..rods.sections import Material, Section, material_from_dict, section_from_
 from .base import Design, Role, Target, register
 from .grid_network import network_on
 from .lamellas import straighten_on
+from .load_case import hold_in_place
 from .network import CurveNetwork
 from .surfaces import AnalyticSurface, Surface
 
@@ -37,6 +38,10 @@ class Grid(Design):
     network : curves in its parameter plane
     section : width across the lamella, in the tangent plane (thin); height along the normal
     elements_per_piece : rod elements of each straight piece
+    held : joints that keep their places on the surface, by supports or an edge beam: their numbers, "corners" (where
+        two lamellas end) or "boundary" (where one ends); default: none, the grid finds its own shape
+
+    Raises InputError for held joints that don't exist, or that lie on one line.
     """
 
     class_name = "grid"
@@ -44,13 +49,14 @@ class Grid(Design):
     roles = (Role("deployed", fitted=True),)
 
     def __init__(self, name: str, surface: Surface, network: CurveNetwork, section: Section, material: Material, *,
-                 elements_per_piece: int = 2):
+                 elements_per_piece: int = 2, held: str | Sequence[int] | None = None):
         self.name, self.surface, self.network = name, surface, network
         self.section, self.material, self.elements_per_piece = section, material, elements_per_piece
         self.straight = straighten_on(surface, network)
         numbering = self.straight.numbering
         self.parameters, self.groups = numbering.parameters, numbering.groups
         self.lower, self.upper = numbering.bounds(_LARGEST_CORNER)
+        self.held = None if held is None else _held_joints(network, surface.points(network.joints), held)
         self.joints = self._model.joints
 
     @cached_property
@@ -58,7 +64,7 @@ class Grid(Design):
         from .grid_scene import grid_scene
 
         return grid_scene(self.surface, self.network, self.straight, self.section, self.material,
-                          self.elements_per_piece)
+                          self.elements_per_piece, self.held)
 
     def scene(self, role: str = "deployed") -> Scene:
         return self._model.scene
@@ -70,7 +76,9 @@ class Grid(Design):
         try:
             return {"deployed": solve(self.systems["deployed"], self.parameters if q is None else q)}
         except SimulationFailure as failure:
-            raise failure.within("deployed state") from None
+            hint = "" if self.held is not None else \
+                "; a grid that nothing holds may shear without resistance, as on a dome: see the field \"held\""
+            raise SimulationFailure(f"{failure.reason}{hint}", where="deployed state") from None
 
     @cached_property
     def target(self) -> Target:
@@ -84,6 +92,26 @@ class Grid(Design):
 
     def _longest_span(self) -> float:
         return max(float(lamella.spans.lengths.max()) for lamella in self.straight.lamellas)
+
+
+def _held_joints(network: CurveNetwork, points: np.ndarray, held: str | Sequence[int]) -> np.ndarray:
+    """(k,) the joints that keep their places, sorted. Raises InputError."""
+    if isinstance(held, str):
+        ends = np.bincount([joint for strand in network.strands for joint in (strand.joints[0], strand.joints[-1])
+                            if not strand.closed], minlength=len(points))
+        least = {"boundary": 1, "corners": 2}.get(held)
+        if least is None:
+            raise InputError('expected numbers of joints, "corners" or "boundary"', field="held", value=held)
+        found = np.flatnonzero(ends >= least)
+    else:
+        found = np.unique(np.asarray(held, int))
+        unknown = found[(found < 0) | (found >= len(points))]
+        if len(unknown):
+            raise InputError(f"names a joint that doesn't exist (joints 0 to {len(points) - 1})", field="held",
+                             value=int(unknown[0]))
+    if not hold_in_place(points[found]):
+        raise InputError("joints on one line don't hold a grid", field="held", value=found.tolist())
+    return found
 
 
 def _triangulated(surface: Surface, network: CurveNetwork, joints: np.ndarray,
@@ -120,7 +148,8 @@ def read_grid(data: Mapping[str, Any], source: str) -> Grid:
     try:
         surface = _surface(data["surface"], source)
         return Grid(data["name"], surface, network_on(surface, data["network"]), section_from_dict(data["section"]),
-                    material_from_dict(data["material"]), elements_per_piece=data.get("elements_per_piece", 2))
+                    material_from_dict(data["material"]), elements_per_piece=data.get("elements_per_piece", 2),
+                    held=data.get("held"))
     except InputError as error:
         raise error.at(source) from None
 

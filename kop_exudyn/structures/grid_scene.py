@@ -32,8 +32,11 @@ class GridScene:
 
 
 def grid_scene(surface: Surface, network: CurveNetwork, straight: Lamellas, section: Section, material: Material,
-               elements_per_piece: int) -> GridScene:
-    """Joints on the surface, corners over the chords, everything rigidly held by the joint nearest to the middle."""
+               elements_per_piece: int, held: np.ndarray | None = None) -> GridScene:
+    """Joints on the surface, corners over the chords.
+
+    held : joints that keep their places; None: the one nearest to the middle is fixed, which only stops rigid motions
+    """
     builder = SceneBuilder(len(straight.numbering.parameters))
     places = surface.at(network.joints)
     first, second = (np.array([straight.lamellas[c].tangents[k] for c, k in zip(*side)])
@@ -48,7 +51,11 @@ def grid_scene(surface: Surface, network: CurveNetwork, straight: Lamellas, sect
         nodes = builder.nodes(joints[own], np.where(turns, hinges[own], -1))
         for k in range(lamella.strand.n_spans):
             _add_span(builder, lamella, k, places.points, nodes, stiffness, section, elements_per_piece)
-    builder.pin(int(joints[middle_joint(places.points)]))
+    if held is None:
+        builder.pin(int(joints[middle_joint(places.points)]))
+    else:
+        for joint in held:
+            builder.pin(int(joints[joint]), (0, 1, 2))
     return GridScene(builder.build(), joints, hinges)
 
 

@@ -8,6 +8,16 @@ import numpy as np
 
 from ..errors import InputError
 
+_STRAIGHT = 1e-3  # points within this share of their extent from a line don't hold a structure
+
+
+def hold_in_place(points: np.ndarray) -> bool:
+    """Whether a structure that is held at points (k, 3) can't turn: three or more, not on one line."""
+    if len(points) < 3:
+        return False
+    extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(extents[1] > _STRAIGHT * extents[0])
+
 
 @dataclass(frozen=True)
 class LoadCase:

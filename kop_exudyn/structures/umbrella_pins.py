@@ -10,12 +10,12 @@ from scipy.spatial.transform import Rotation
 from ..errors import InputError
 from ..scene.scene import Driven, Scene
 from ..scene.state import State
+from .load_case import hold_in_place
 from .umbrella_layout import BaseMesh
 from .umbrella_mesh import UmbrellaTarget
 
 # How far a pin may go from its first place, as a share of the pins' bounding-box diagonal.
 _REACH = 0.1
-_STRAIGHT = 1e-3  # pins within this share of their extent from a line leave the mesh free to turn about it
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,7 @@ class Pins:
             raise InputError("expected three different X joints or more", field="pins.joints", value=joints.tolist())
         if positions.shape != (len(joints), 3) or not np.isfinite(positions).all():
             raise InputError(f"expected {len(joints)} finite points", field="pins.positions")
-        extents = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
-        if not extents[1] > _STRAIGHT * extents[0]:
+        if not hold_in_place(positions):
             raise InputError("pins on one line don't hold a structure", field="pins.positions")
 
     @property

@@ -257,7 +257,13 @@ class TestGrids:
         options = ("--as", "grid", "--surface", str(surface), "--section", "0.004,0.05", "--material", "1.1e10,0.3")
         assert main(["import", str(plan), "--out", str(out), *options]) == 0
         design = load_design(out)
-        assert design.class_name == "grid" and design.network.n_joints == 9
+        assert design.class_name == "grid" and design.network.n_joints == 9 and design.held is None
+        for words, numbers in (("corners", [0, 2, 6, 8]), ("0,2,8", [0, 2, 8])):
+            assert main(["import", str(plan), "--out", str(out), *options, "--held", words, "--overwrite"]) == 0
+            assert load_design(out).held.tolist() == numbers
+        capsys.readouterr()
+        assert main(["import", str(plan), "--out", str(out), *options, "--held", "0,1,9", "--overwrite"]) == 2
+        assert "held = 9: names a joint that doesn't exist" in capsys.readouterr().err
         found = {tuple(x) for x in design.target.positions[:, :2].round(6).tolist()}
         assert found == {(x, y) for x in (-0.6, 0.0, 0.6) for y in (-0.5, 0.0, 0.5)}
 
