@@ -10,6 +10,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass
 from time import perf_counter, process_time
+from typing import Iterable
 
 import numpy as np
 
@@ -68,6 +69,22 @@ class Confirmation:
                 "moved": self.moved, "wall_s": self.wall_s}
 
 
+@dataclass(frozen=True)
+class _Carried:
+    """The carriers as arrays: bodies, hinges (-1: the body itself), nodes (n,) and frames (n, 3, 3)."""
+
+    bodies: np.ndarray
+    hinges: np.ndarray
+    nodes: np.ndarray
+    frames: np.ndarray
+
+    @classmethod
+    def of(cls, carriers: Iterable[Carrier]) -> _Carried:
+        items = list(carriers)
+        numbers = np.array([(c.body, c.hinge, c.node) for c in items], int).reshape(-1, 3)
+        return cls(*numbers.T, np.array([c.frame for c in items]).reshape(-1, 3, 3))
+
+
 class ExudynModel:
     """Exudyn's model of one scene; `confirm` may be called for any equilibrium of that scene."""
 
@@ -85,6 +102,8 @@ class ExudynModel:
             self._add_loads()
             self._mbs.Assemble()
         self._settings = self._solver_settings()
+        self._solver = exu.MainSolverStatic()  # kept, since making one takes a sixth of a confirmation
+        self._carried = _Carried.of(self.layout.carriers.values())
 
     def confirm(self, equilibrium: Equilibrium) -> Confirmation:
         """Solve with Exudyn, starting from the equilibrium: Newton steps of its static solver, its residual at the end.
@@ -125,8 +144,9 @@ class ExudynModel:
         data.SetODE2Coordinates((total - reference).ravel(), configuration=initial)
         data.SetAECoordinates(np.zeros(data.AEsize()), configuration=initial)
         try:
-            exu.MainSolverStatic().SolveSystem(self._mbs, self._settings)
+            self._solver.SolveSystem(self._mbs, self._settings)
         except Exception as error:  # Exudyn raises its own types, some of them plain RuntimeErrors
+            self._solver = exu.MainSolverStatic()
             raise SimulationFailure(f"Exudyn's static solver failed: {str(error).splitlines()[0][:120]}") from None
         increment = data.GetODE2Coordinates().reshape(-1, 6) - (total - reference)
         if not np.isfinite(increment).all():
@@ -136,7 +156,7 @@ class ExudynModel:
 
     def _residual(self, coordinates: np.ndarray, reactions: np.ndarray) -> float:
         """Norm of Exudyn's residual, equations of equilibrium and of joints, at coordinates (n_nodes, 6)."""
-        solver, data = exu.MainSolverStatic(), self._mbs.systemData
+        solver, data = self._solver, self._mbs.systemData
         solver.InitializeSolver(self._mbs, self._settings)
         data.SetODE2Coordinates(coordinates.ravel())
         data.SetAECoordinates(reactions)
@@ -375,18 +395,17 @@ class ExudynModel:
 
     def _state(self, solution: np.ndarray, near: State) -> State:
         """The scene's state of Exudyn's coordinates; hinge angles on the same turn as those of a state nearby."""
-        R = exp_so3(solution[:, 3:])
         positions, rotations, angles = near.positions.copy(), near.rotations.copy(), near.angles.copy()
-        for (body, hinge), carrier in self.layout.carriers.items():
-            if hinge < 0:
-                positions[body] = solution[carrier.node, :3] * self._length
-                rotations[body] = R[carrier.node] @ carrier.frame.T
-        for (body, hinge), carrier in self.layout.carriers.items():
-            if hinge >= 0:
-                turn = rotations[body].T @ R[carrier.node] @ carrier.frame.T
-                sine = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-                measured = np.arctan2(sine @ self.scene.hinge_axis[hinge], np.trace(turn) - 1)
-                angles[hinge] += np.remainder(measured - near.angles[hinge] + np.pi, 2 * np.pi) - np.pi
+        frames = exp_so3(solution[self._carried.nodes, 3:]) @ self._carried.frames.transpose(0, 2, 1)
+        bodies, hinges = self._carried.bodies, self._carried.hinges
+        hubs, turned = np.flatnonzero(hinges < 0), np.flatnonzero(hinges >= 0)
+        positions[bodies[hubs]] = solution[self._carried.nodes[hubs], :3] * self._length
+        rotations[bodies[hubs]] = frames[hubs]
+        turn = rotations[bodies[turned]].transpose(0, 2, 1) @ frames[turned]
+        sine = np.stack([turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]], axis=1)
+        cosine = np.trace(turn, axis1=1, axis2=2) - 1
+        measured = np.arctan2(np.einsum("nk,nk->n", sine, self.scene.hinge_axis[hinges[turned]]), cosine)
+        angles[hinges[turned]] += np.remainder(measured - near.angles[hinges[turned]] + np.pi, 2 * np.pi) - np.pi
         return State(positions, rotations, angles)
 
 

@@ -193,10 +193,10 @@ class _Scaling:
         return cls(variable, row, _largest(variable * qp.g) or 1.0)
 
     def apply(self, qp: QP) -> ScaledQP:
-        columns = sp.diags(self.variable)
         unit = self.length * self.variable
-        H = sp.csc_matrix(columns @ qp.H @ columns)
-        A = sp.csr_matrix(sp.diags(self.row) @ qp.A @ columns)
+        H, A = sp.csc_matrix(qp.H, copy=True), sp.csr_matrix(qp.A, copy=True)
+        H.data *= self.variable[H.indices] * np.repeat(self.variable, np.diff(H.indptr))
+        A.data *= np.repeat(self.row, np.diff(A.indptr)) * self.variable[A.indices]
         for matrix in (H, A):
             matrix.sort_indices()
         lo, hi = self.row * qp.lo / self.length, self.row * qp.hi / self.length

@@ -77,8 +77,9 @@ def _dense_blocks(matrix: sp.csc_matrix, border: int) -> list[slice] | None:
     inner = sp.csc_matrix(matrix)[:n, :n]
     if n == 0 or inner.nnz < _DENSE_SHARE * n:
         return None
-    last = np.zeros(n, int)
-    np.maximum.at(last, np.repeat(np.arange(n), np.diff(inner.indptr)), inner.indices)
+    inner.sort_indices()
+    last, filled = np.arange(n), np.diff(inner.indptr) > 0
+    last[filled] = inner.indices[inner.indptr[1:][filled] - 1]
     reach = np.maximum.accumulate(np.maximum(last, np.arange(n)))
     ends = np.flatnonzero(reach == np.arange(n)) + 1
     blocks = [slice(a, b) for a, b in zip([0, *ends[:-1]], ends)]

@@ -102,19 +102,21 @@ class TriangleSurface:
         A point above an inner edge of a flat region, or on the surface itself, is one of a face although its
         projection has a zero barycentric coordinate: there an edge's derivative would be wrong.
         """
-        corners = self.vertices[self.faces[faces]]
-        zero = np.abs(_barycentric(projected, corners)) < _ON_EDGE
-        offset = points - projected
-        height = np.einsum("nk,nk->n", offset, self.normals[faces])
-        aside = np.linalg.norm(offset - height[:, None] * self.normals[faces], axis=1)
-        normal = aside <= _NORMAL_ABSOLUTE * self.diagonal + _NORMAL_RELATIVE * np.abs(height)
-        count = np.where(normal, 0, zero.sum(axis=1))
-        opposite = zero.argmax(axis=1)  # the edge lies opposite to the corner whose coordinate is zero
-        rows = np.arange(len(faces))
-        edge = corners[rows, (opposite + 2) % 3] - corners[rows, (opposite + 1) % 3]
-        edge /= np.linalg.norm(edge, axis=1, keepdims=True)
-        features = np.array([Feature.FACE, Feature.EDGE, Feature.VERTEX, Feature.VERTEX])[count]
-        return features, np.where((features == Feature.EDGE)[:, None], edge, 0.0)
+        features, edges = np.full(len(faces), Feature.FACE), np.zeros((len(faces), 3))
+        offset, normals = points - projected, self.normals[faces]
+        height = np.einsum("nk,nk->n", offset, normals)
+        aside = np.linalg.norm(offset - height[:, None] * normals, axis=1)
+        others = np.flatnonzero(aside > _NORMAL_ABSOLUTE * self.diagonal + _NORMAL_RELATIVE * np.abs(height))
+        if len(others):
+            corners = self.vertices[self.faces[faces[others]]]
+            zero = np.abs(_barycentric(projected[others], corners)) < _ON_EDGE
+            features[others] = np.array([Feature.FACE, Feature.EDGE, Feature.VERTEX, Feature.VERTEX])[zero.sum(axis=1)]
+            opposite = zero.argmax(axis=1)  # the edge lies opposite to the corner whose coordinate is zero
+            rows = np.arange(len(others))
+            edge = corners[rows, (opposite + 2) % 3] - corners[rows, (opposite + 1) % 3]
+            edge /= np.linalg.norm(edge, axis=1, keepdims=True)
+            edges[others] = np.where((features[others] == Feature.EDGE)[:, None], edge, 0.0)
+        return features, edges
 
 
 def _barycentric(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
