@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     if not parts:
         raise InputError("says nothing of the parts: --parts or --kit is required", source=args.folder)
     Weights.of(args.weights or {})  # names that aren't terms are found before anything is read
-    study = replace(study, settings=replace(study.settings, **_given(args)), weights=study.weights | (args.weights or {}))
+    study = replace(study, settings=replace(study.settings, **_given(args)), weights={**study.weights, **(args.weights or {})})
     designs = study.designs()
     result = optimize_kit(designs, parts, out=args.out, inputs=study.files, resume=args.resume,
                           settings=study.job_settings(designs, args.jobs or usable_cores()), overwrite=args.overwrite,

@@ -82,7 +82,7 @@ class _Carried:
     def of(cls, carriers: Iterable[Carrier]) -> _Carried:
         items = list(carriers)
         numbers = np.array([(c.body, c.hinge, c.node) for c in items], int).reshape(-1, 3)
-        return cls(*numbers.T, np.array([c.frame for c in items]).reshape(-1, 3, 3))
+        return cls(numbers[:, 0], numbers[:, 1], numbers[:, 2], np.array([c.frame for c in items]).reshape(-1, 3, 3))
 
 
 class ExudynModel:
