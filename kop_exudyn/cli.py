@@ -74,7 +74,7 @@ def make_parser() -> argparse.ArgumentParser:
             name, parents=[verbosity], help=command.HELP, description=command.DESCRIPTION,
             epilog=f"{command.EXAMPLES}\n\n{_STATUS}", formatter_class=argparse.RawDescriptionHelpFormatter)
         command.arguments(subparser)
-        subparser.set_defaults(run=command.run)
+        subparser.set_defaults(run=command.run, parser=parser)
     return parser
 
 

@@ -25,13 +25,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     import shtab
 
-    from ..cli import make_parser
-
-    parser = make_parser()
-    for action in _actions(parser):
+    for action in _actions(args.parser):
         if action.type is Path:
             action.complete = shtab.FILE  # type: ignore[attr-defined]  # where shtab looks for it
-    script = shtab.complete(parser, shell=args.shell)
+    script = shtab.complete(args.parser, shell=args.shell)
     report(args, {"shell": args.shell, "script": script}, script if script.endswith("\n") else script + "\n")
     return 0
 
