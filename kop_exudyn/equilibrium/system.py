@@ -7,7 +7,7 @@ from time import perf_counter
 import numpy as np
 import scipy.sparse as sp
 
-from ..scene.assembly import ENERGY, GRADIENT, HESSIAN, assemble_rods, predict_stress, scatter_blocks
+from ..scene.assembly import ENERGY, GRADIENT, HESSIAN, assemble_rods, largest_forces, predict_stress, scatter_blocks
 from ..scene.scene import Scene
 from ..scene.sparsity import sparsity_of
 from ..scene.state import State
@@ -59,6 +59,7 @@ class System:
         self._plain = scene.plain_nodes
         self.metric = self._metric()
         self.constraint = self._constraint()
+        self._forces: tuple[float, float] | None = None  # of the state assembled last
         self.factorised_at: State | None = None  # where the unshifted, unmixed Hessian at hand was factorised
         self.is_rotation = self._dof_is_rotation()[s.free]
         self.force_weight = np.where(self.is_rotation, 1 / scene.length_scale, 1.0)  # moments count as forces
@@ -80,6 +81,7 @@ class System:
     def set_parameters(self, q: np.ndarray) -> None:
         """Take the rest lengths of q; raises SimulationFailure unless they are positive."""
         self.lengths = self.scene.rest_lengths(q)
+        self._forces = None
 
     def assemble(self, state: State, order: int = HESSIAN, mixed: bool = False) -> Energy:
         """Energy, and up to the order asked for gradient and Hessian, at a state.
@@ -88,7 +90,7 @@ class System:
         """
         begin = perf_counter()
         scene, s, count = self.scene, self.sparsity, self.counters
-        self.factorised_at = None
+        self.factorised_at = self._forces = None
         if order >= GRADIENT:
             self.gradient[:] = 0.0
         if order == HESSIAN:
@@ -165,11 +167,12 @@ class System:
         Moments count divided by the length scale. Round-off: coordinates of size s leave strains of about
         eps s / L, hence forces of eps s EA / L.
         """
-        scene = self.scene
-        stress = np.abs(self.stress())
-        stress[:, 3:] /= scene.length_scale
-        noise = np.finfo(float).eps * scene.size * np.max(scene.stiffness[:, 0] / self.lengths)
-        return float(stress.max()), float(noise)
+        if self._forces is None:
+            scene = self.scene
+            force, moment, stretch = largest_forces(self.strain, scene.stiffness, self.lengths)
+            self._forces = (float(np.maximum(force, moment / scene.length_scale)),
+                            float(np.finfo(float).eps * scene.size * stretch))
+        return self._forces
 
     def _dof_is_rotation(self) -> np.ndarray:
         rotation = np.ones(self.scene.n_dofs, bool)

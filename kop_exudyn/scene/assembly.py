@@ -276,3 +276,18 @@ def predict_stress(strain, B14, rows, increment, K, L, stress):
                 if rows[e, c] >= 0:
                     v += B14[e, r, c] * increment[rows[e, c]]
             stress[e, r] = K[e, r] * v / L[e]
+
+
+@nb.njit(cache=True)
+def largest_forces(strain, K, L):
+    """Largest force and moment in the elements, and largest K_0 / L; NaN where a strain is."""
+    force, moment, stretch = 0.0, 0.0, 0.0
+    for e in range(strain.shape[0]):
+        stretch = max(stretch, K[e, 0] / L[e])
+        for r in range(3):
+            f, m = abs(K[e, r] * strain[e, r] / L[e]), abs(K[e, r + 3] * strain[e, r + 3] / L[e])
+            if f > force or f != f:  # nothing is larger than NaN, so it stays
+                force = f
+            if m > moment or m != m:
+                moment = m
+    return force, moment, stretch
