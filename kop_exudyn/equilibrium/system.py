@@ -25,6 +25,7 @@ class Counters:
     solves: int = 0
     assembly_s: float = 0.0
     factorisation_s: float = 0.0
+    solve_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -142,8 +143,11 @@ class System:
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """K^-1 rhs with the factorisation at hand; rhs (n_free,) or (n_free, k)."""
+        begin = perf_counter()
+        found = self.factorisation.solve(rhs)
         self.counters.solves += 1 if rhs.ndim == 1 else rhs.shape[1]
-        return self.factorisation.solve(rhs)
+        self.counters.solve_s += perf_counter() - begin
+        return found
 
     def solve_columns(self, rhs: sp.csc_matrix, column: np.ndarray | None = None) -> np.ndarray:
         """Solutions (n_free, k) for many sparse right-hand sides; with column = K^-1 c on the constraint's kernel."""
