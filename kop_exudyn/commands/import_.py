@@ -44,6 +44,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
                        "assembly to deployment, in radians or as 35deg")
     shell.add_argument("--surface", type=Path, metavar="MESH", help="mesh (.obj, .ply, .stl, COMPAS .json) that the "
                        "grid lies on, above the drawing in the z direction")
+    shell.add_argument("--target", type=Path, metavar="MESH", help="of a C-shell: mesh to keep to, which lies about as the "
+                       "deployed design does (default: the surface through its deployed curves)")
     shell.add_argument("--held", type=held_joints, metavar="JOINTS", help="of a grid: joints that keep their places on the "
                        "surface, \"corners\", \"boundary\" or numbers (default: none; domes need some)")
     shell.add_argument("--section", type=number_pair, metavar="WIDTH,HEIGHT", help="of the rods: across the normal of "
@@ -87,6 +89,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _c_shell(args: argparse.Namespace) -> dict[str, Any]:
+    from os.path import relpath
+
+    from ..errors import InputError
     from ..io.drawn_networks import c_shell_data, read_network
     from ..structures.base import design_from_dict
 
@@ -94,7 +99,12 @@ def _c_shell(args: argparse.Namespace) -> dict[str, Any]:
     curves = read_network(args.file, args.layer, kind=args.curves, scale=args.scale, free_ends=args.free_ends)
     data = c_shell_data(args.file.stem, curves, _section(args), _material(args), args.opening,
                         free_ends=args.free_ends)
-    design_from_dict(data, str(args.file))  # complains about what no C-shell can be made of
+    if args.target is not None:
+        data["target"] = {"file": Path(relpath(args.target, args.out.parent)).as_posix()}
+    try:
+        design_from_dict(data, str(args.out))  # complains about what no C-shell can be made of; paths begin there
+    except InputError as error:
+        raise InputError(error.message, source=args.file, field=error.field, value=error.value) from None
     return data
 
 

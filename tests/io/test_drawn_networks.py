@@ -208,6 +208,19 @@ class TestCommand:
         assert {strand.head for strand in design.network.strands} != {0.0}
         assert json.loads(out.read_text())["material"]["elastic_limit"] == 4e7
 
+    def test_a_mesh_to_keep_to(self, obj, tmp_path, repository, capsys):
+        (tmp_path / "designs").mkdir()
+        mesh, out = tmp_path / "meshes" / "hill.obj", tmp_path / "designs" / "net.json"
+        options = ("import", str(obj), "--out", str(out), *OPTIONS, "--target", str(mesh))
+        assert main(list(options)) == 2
+        assert "target.file = " in capsys.readouterr().err and not out.exists()
+        mesh.parent.mkdir()
+        mesh.write_text("v -5 -5 0\nv 5 -5 0\nv 0 5 0\nv 0 0 1\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")
+        assert main(list(options)) == 0
+        assert json.loads(out.read_text())["target"] == {"file": "../meshes/hill.obj"}
+        design = load_design(out)
+        assert len(design.target.faces) == 3 and len(design.target.positions) == design.network.n_joints
+
     def test_dxf_to_design_with_json(self, drawing, tmp_path, capsys):
         document, space = drawing
         for y in (0, 1000):

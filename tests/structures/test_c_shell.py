@@ -5,10 +5,14 @@ import pickle
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from kop_exudyn.analysis.simulation import simulate
 from kop_exudyn.equilibrium.exudyn_model import ExudynModel
 from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.errors import InputError
+from kop_exudyn.optimize.input_fit import fit_input
+from kop_exudyn.optimize.objective import DesignObjective, Weights
 from kop_exudyn.structures.base import design_from_dict
 
 SMALL = 5  # joints a side
@@ -200,3 +204,42 @@ def test_crossings_listed_without_a_place(c_shell_data):
     """Straight lines cross once: "near" may be left out."""
     pairs = [{"curves": [a, b]} for a in range(3) for b in range(3, 6)]
     assert len(design_from_dict({**c_shell_data, "crossings": pairs}).joints) == 9
+
+
+# -- a mesh as target --------------------------------------------------------------------------------------------------
+def write_mesh(path, vertices, faces):
+    path.write_text("".join(f"v {x:.12g} {y:.12g} {z:.12g}\n" for x, y, z in vertices)
+                    + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in faces))
+
+
+class TestMeshTargets:
+    def test_its_own_target_elsewhere_is_the_same_target(self, conformal, shell, tmp_path):
+        turn = Rotation.from_rotvec([0.05, -0.1, 0.2])
+        own = shell.target
+        write_mesh(tmp_path / "moved.obj", turn.apply(own.vertices) + 0.1 * own.diagonal, own.faces)
+        design = design_from_dict(small(conformal) | {"target": {"file": "moved.obj"}}, str(tmp_path / "shell.json"))
+        places = turn.apply(own.positions) + 0.1 * own.diagonal
+        assert np.abs(design.target.positions - places).max() < 0.02 * own.diagonal  # slid along the surface a little
+        mine, meshs = simulate(shell), simulate(design)
+        assert meshs.fit.max_percent < mine.fit.max_percent + 0.1
+
+    def test_the_fit_to_another_surface(self, conformal, shell, tmp_path):
+        """A shell keeps to a mesh that is somewhat flatter than what it opens into."""
+        own = shell.target
+        flatter = own.vertices * [1.0, 1.0, 0.9]
+        write_mesh(tmp_path / "flatter.obj", flatter, own.faces)
+        design = design_from_dict(small(conformal) | {"target": {"file": "flatter.obj"}}, str(tmp_path / "shell.json"))
+        before = DesignObjective(design, Weights(energy=0.0)).evaluate(design.parameters)
+        after = fit_input(design, Weights(energy=0.0), max_steps=8)
+        assert after.fit.value < 0.3 * before.fit.value and after.confirmations
+
+    @pytest.mark.parametrize("content, message", [
+        (None, "target.file = .*: no such file"),
+        ("v 0 0 0\n", "target.file = .*no.obj.: "),
+        ("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "target.file"),
+    ])
+    def test_unusable_meshes(self, content, message, conformal, tmp_path):
+        if content is not None:
+            (tmp_path / "no.obj").write_text(content)
+        with pytest.raises(InputError, match=message):
+            design_from_dict(small(conformal) | {"target": {"file": "no.obj"}}, str(tmp_path / "shell.json")).target

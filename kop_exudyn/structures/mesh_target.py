@@ -1,0 +1,40 @@
+"""A target surface from a mesh file, for designs that don't lie on it to begin with."""
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ..errors import InputError
+from ..scene.surface import TriangleSurface
+from .base import Target
+from .mesh_files import read_mesh
+
+_MAX_ITERATIONS = 200
+_SETTLED = 1e-6  # of the joints' size, by which an iteration moves them
+
+
+def target_on_mesh(path: Path, joints: np.ndarray) -> Target:
+    """The mesh of a file, and for each joint (n, 3) a place on it.
+
+    The joints are laid onto the mesh from where they are, by turns of closest points and best rigid motions (Besl and
+    McKay, IEEE PAMI 14, 1992). So the mesh has to lie and face about as the joints do; the target fitting of every
+    later state looks for the best placement by itself.
+
+    Raises InputError, naming the field "target.file", for files that contain no usable mesh.
+    """
+    vertices, faces = read_mesh(path, "target.file")
+    try:
+        surface = TriangleSurface(vertices, faces)
+    except InputError as error:
+        raise InputError(f"{error.message} ({error.field})", field="target.file", value=path.name) from None
+    size, laid = float(np.linalg.norm(np.ptp(joints, axis=0))), joints
+    for _ in range(_MAX_ITERATIONS):
+        goal, before = surface.closest(laid).points, laid
+        turn = Rotation.align_vectors(goal - goal.mean(axis=0), joints - joints.mean(axis=0))[0]
+        laid = turn.apply(joints - joints.mean(axis=0)) + goal.mean(axis=0)
+        if np.abs(laid - before).max() <= _SETTLED * size:
+            break
+    positions = surface.closest(laid).points
+    return Target(surface.vertices, surface.faces, positions, float(np.linalg.norm(np.ptp(positions, axis=0))))
