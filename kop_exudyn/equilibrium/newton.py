@@ -269,8 +269,9 @@ class _Run:
             counted = scale == 1.0 or system.conservative
             if since == 0:
                 best.slope = scale * float(residual @ step)
-            system.predict_stress(scale * step)
-            self.state = self.state.moved(system.increment(scale * step))
+            taken = scale * step
+            system.predict_stress(taken)
+            self.state = self.state.moved(system.increment(taken))
             self.torque += scale * float(change)
 
     def _headway(self, best: _Best, value: float, merit: float) -> bool:
@@ -413,7 +414,7 @@ class _Run:
 
     def _capped(self, step: np.ndarray, cap: float) -> float:
         """Share of a step that turns nothing by more than a cap, rad."""
-        turn = np.abs(step[self.system.is_rotation]).max(initial=0.0)
+        turn = np.abs(step.take(self.system.rotations)).max(initial=0.0)
         return min(1.0, cap / max(turn, np.finfo(float).tiny))
 
     def _close_gap(self) -> None:

@@ -63,6 +63,7 @@ class System:
         self._forces: tuple[float, float] | None = None  # of the state assembled last
         self.factorised_at: State | None = None  # where the unshifted, unmixed Hessian at hand was factorised
         self.is_rotation = self._dof_is_rotation()[s.free]
+        self.rotations = np.flatnonzero(self.is_rotation)  # taking numbers is quicker than a mask
         self.force_weight = np.where(self.is_rotation, 1 / scene.length_scale, 1.0)  # moments count as forces
 
     @property
