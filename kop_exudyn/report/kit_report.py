@@ -36,7 +36,9 @@ def write_kit_report(result: KitResult, folder: Path) -> Path:
 def _page(result: KitResult, figures: dict) -> Page:
     sizes = " and ".join(f"{count} {kind}" for kind, count in result.kit.sizes.items())
     elements = sum(design.n_elements for design in result.designs)
-    page = Page(f"One kit of parts for {len(result.designs)} designs",
+    designs = "a design" if len(result.designs) == 1 else f"{len(result.designs)} designs"
+    title = f"An existing kit for {designs}" if "kit" in result.settings else f"One kit of parts for {designs}"
+    page = Page(title,
                 f"{sizes} parts realise the {elements} elements of {', '.join(d.name for d in result.designs)}.")
     page.links({"Turn the designs around in 3D": "viewer.html"})
     page.table(*summary_rows(result),

@@ -167,6 +167,7 @@ def test_designs_from_a_kit_that_exists(finished, tmp_path):
     evaluation = result.stages["assigned"].designs[0]
     assert "unrelaxed" not in result.stages and evaluation.confirmations
     np.testing.assert_array_equal(result.stages["assigned"].assignment.realise(kit, evaluation.q), evaluation.q)
+    assert "<h1>An existing kit for a design</h1>" in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
     data = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
     assert data["settings"]["kit"] == kit.to_dict() and data["kit"] == kit.to_dict()
     assert load_run(tmp_path / "out", zigzags()[:1]).kit.to_dict() == kit.to_dict()
