@@ -1,4 +1,6 @@
 """The objective's terms: exact gradients, honest models, and one that is added from outside."""
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -65,6 +67,15 @@ def test_more_weight_on_stress_lowers_it(repository):
                  for j, e in zip(judge, outcome.stages["assigned"].designs)]
         stresses.append(sum(found))
     assert stresses[1] < 0.97 * stresses[0]
+
+
+def test_stress_needs_cross_sections(repository):
+    design = load_design(repository / "models" / "grids" / "01_dome.json")
+    scene = design.scene("deployed")
+    bare = replace(scene, chains=tuple(replace(chain, section=None) for chain in scene.chains))
+    design.scene = lambda role: bare
+    with pytest.raises(InputError, match="dome: weights.stress: the rods' cross-sections aren't known"):
+        DesignObjective(design, Weights.of({"stress": 1.0}))
 
 
 def test_a_term_is_one_class(repository, monkeypatch):

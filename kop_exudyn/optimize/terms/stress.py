@@ -35,6 +35,8 @@ class Stress(Term):
     def __init__(self, design: Design, reference: Reference):
         super().__init__(design, reference)
         self._forms = {role.name: _quadratic_forms(design.scene(role.name)) for role in design.roles}
+        if not all(form.any() for form in self._forms.values()):
+            raise InputError("the rods' cross-sections aren't known", source=design.name, field="weights.stress")
         fitted = design.fitted_role
         self._scale = 1.0
         self._scale = self.value(fitted, reference.equilibria[fitted.name])
