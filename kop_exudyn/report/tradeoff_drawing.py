@@ -74,4 +74,4 @@ def _mark(panels: Sequence[Axes], fit: Axes, size: int, row: Mapping[str, Any]) 
         ax.axvline(size, color=QUIET, linestyle=":", linewidth=1.2, zorder=0)
     if row["max %"] is not None:
         fit.plot(size, row["max %"], "o", markersize=11, markerfacecolor="none", markeredgecolor=PALETTE["black"])
-        fit.annotate("knee", (size, row["max %"]), xytext=(9, 9), textcoords="offset points")
+        fit.annotate("knee", (size, row["max %"]), xytext=(-9, -9), textcoords="offset points", ha="right", va="top")
