@@ -102,7 +102,6 @@ class ExudynModel:
             self._add_loads()
             self._mbs.Assemble()
         self._settings = self._solver_settings()
-        self._solver = exu.MainSolverStatic()  # kept, since making one takes a sixth of a confirmation
         self._carried = _Carried.of(self.layout.carriers.values())
 
     def confirm(self, equilibrium: Equilibrium) -> Confirmation:
@@ -144,9 +143,9 @@ class ExudynModel:
         data.SetODE2Coordinates((total - reference).ravel(), configuration=initial)
         data.SetAECoordinates(np.zeros(data.AEsize()), configuration=initial)
         try:
-            self._solver.SolveSystem(self._mbs, self._settings)
+            # a new solver each time: one that is kept is quicker, but its steps depend, in their last digits, on earlier ones
+            exu.MainSolverStatic().SolveSystem(self._mbs, self._settings)
         except Exception as error:  # Exudyn raises its own types, some of them plain RuntimeErrors
-            self._solver = exu.MainSolverStatic()
             raise SimulationFailure(f"Exudyn's static solver failed: {str(error).splitlines()[0][:120]}") from None
         increment = data.GetODE2Coordinates().reshape(-1, 6) - (total - reference)
         if not np.isfinite(increment).all():
@@ -156,7 +155,7 @@ class ExudynModel:
 
     def _residual(self, coordinates: np.ndarray, reactions: np.ndarray) -> float:
         """Norm of Exudyn's residual, equations of equilibrium and of joints, at coordinates (n_nodes, 6)."""
-        solver, data = self._solver, self._mbs.systemData
+        solver, data = exu.MainSolverStatic(), self._mbs.systemData
         solver.InitializeSolver(self._mbs, self._settings)
         data.SetODE2Coordinates(coordinates.ravel())
         data.SetAECoordinates(reactions)

@@ -212,7 +212,8 @@ class _Run:
             self._leave_saddle(energy)
             # on the second saddle in a row the quick iteration leads back: descend all the way
             converged = self._mixed() if self.options.mixed and self.escapes == 1 else self._descend(60)
-        self.system.factorised_at = self.state
+        # taken at a predicted stress, however close, the factors aren't those that another process would make of the state
+        self.system.factorised_at = self.state if self.assembled is None else None
         return Equilibrium(
             state=self.state, q=np.array(self.q, float), opening=self.opening,
             torque=self.torque, stress=self.system.stress(), elastic_energy=energy.elastic, potential=energy.potential,

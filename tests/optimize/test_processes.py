@@ -1,0 +1,31 @@
+"""An optimisation's result is the same to the last bit, however many processes solve its designs, and when."""
+from __future__ import annotations
+
+import pytest
+
+from kop_exudyn.io.designs import load_designs
+from kop_exudyn.optimize.dataset import Dataset
+from kop_exudyn.optimize.objective import Weights
+from kop_exudyn.optimize.pool import DesignPool
+from kop_exudyn.optimize.stage_settings import StageSettings
+from kop_exudyn.optimize.stages import Stages
+
+
+def tuned(designs, jobs: int) -> tuple:
+    """Parameters and objectives of a few steps over the parts, which lead far from the direct projection."""
+    values: list[float] = []
+    with DesignPool(designs, jobs) as pool:
+        pool.prepare()
+        stages = Stages(Dataset.of_pool(pool, Weights.suiting(designs)), {"linear": 6, "angular": 3},
+                        StageSettings(assigned_steps=5), None, lambda event: values.append(event.record.value))
+        result = stages.assigned(stages.direct(), "unrelaxed")
+    assert len(values) == 5
+    return values, [evaluation.q.tobytes() for evaluation in result.designs]
+
+
+@pytest.mark.parametrize("folder", ["small", "grids"])
+def test_results_depend_on_no_process(repository, folder):
+    designs = load_designs(repository / "models" / folder, 3)
+    alone = tuned(designs, 1)
+    for jobs in (2, 3, 2):
+        assert tuned(designs, jobs) == alone, jobs
