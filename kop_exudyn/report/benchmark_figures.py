@@ -7,6 +7,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from .style import INK, PALETTE, style
 
@@ -57,6 +58,9 @@ def ways_compared(rows: Sequence[Mapping[str, Any]]) -> Figure:
                 _series(axes, own, way, colour, marker)
             note = f"\n(no solution: {', '.join(lost)})" if lost else ""
             axes.set(xscale="log", yscale="log", xlabel=f"time, s{note}", title=case)
+            axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0), numticks=12))  # a decade alone has one label
+            axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            axes.xaxis.set_minor_formatter(NullFormatter())
         panels[0][0].set_ylabel("largest joint error, % of bounding box")
         handles = [plt.Line2D([], [], color=colour, marker=marker, label=way)
                    for way, colour, marker in zip(ways, PALETTE.values(), _MARKERS)]
