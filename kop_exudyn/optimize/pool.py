@@ -5,6 +5,8 @@ import logging
 import os
 from typing import Any, Callable, Sequence
 
+from threadpoolctl import threadpool_limits
+
 from ..errors import SimulationFailure
 from ..memory import peak_memory_mb
 from ..structures.base import Design
@@ -20,6 +22,21 @@ _objectives: dict[tuple[int, Weights], DesignObjective] = {}
 def _initialise(designs: list[Design]) -> None:
     _designs[:] = designs
     _objectives.clear()
+
+
+def _start_worker(designs: list[Design]) -> None:
+    one_thread()
+    _initialise(designs)
+
+
+def one_thread() -> threadpool_limits:
+    """One thread for the BLAS, in this process, until the returned object's `restore_original_limits` is called.
+
+    The matrices are small, more threads only get in the way; and sums would depend on how many cores a machine has.
+    """
+    import scipy.linalg  # noqa: F401  # which brings a BLAS of its own: limits are set for those that are loaded
+
+    return threadpool_limits(1, user_api="blas")
 
 
 def _call(number: int, reference: Reference | None, weights: Weights, method: str, arguments: tuple) -> Any:
@@ -50,10 +67,12 @@ class DesignPool:
         self.designs, self.jobs = list(designs), max(1, min(jobs, len(designs)))
         self.references: list[Reference] = []
         self._parallel: Any = None  # joblib's Parallel, which is untyped
+        self._threads: threadpool_limits | None = None
         if self.jobs == 1:
             _initialise(self.designs)
 
     def __enter__(self) -> DesignPool:
+        self._threads = one_thread()
         if self.jobs > 1:
             self._start()
         return self
@@ -62,6 +81,8 @@ class DesignPool:
         if self._parallel is not None:
             self._parallel.__exit__(*exception)
             self._parallel = None
+        if self._threads is not None:
+            self._threads.restore_original_limits()
         _initialise([])
 
     def prepare(self) -> list[Reference]:
@@ -106,6 +127,6 @@ class DesignPool:
     def _start(self) -> None:
         from joblib import Parallel
 
-        self._parallel = Parallel(n_jobs=self.jobs, backend="loky", initializer=_initialise,
+        self._parallel = Parallel(n_jobs=self.jobs, backend="loky", initializer=_start_worker,
                                   initargs=(self.designs,), batch_size=1, pre_dispatch="all")
         self._parallel.__enter__()

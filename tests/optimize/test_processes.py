@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from kop_exudyn.io.designs import load_designs
 from kop_exudyn.optimize.dataset import Dataset
@@ -29,3 +30,14 @@ def test_results_depend_on_no_process(repository, folder):
     alone = tuned(designs, 1)
     for jobs in (2, 3, 2):
         assert tuned(designs, jobs) == alone, jobs
+
+
+def test_one_thread_for_the_blas_while_designs_are_solved(repository):
+    """Its sums would depend on how many cores there are."""
+    def threads() -> set[int]:
+        return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+    with threadpool_limits(2, user_api="blas"):
+        with DesignPool(load_designs(repository / "models" / "small", 1)):
+            assert threads() == {1}
+        assert threads() == {2}
