@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import pytest
+import scipy.linalg  # noqa: F401  # whose BLAS has to be there before its threads are counted
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from kop_exudyn.io.designs import load_designs
