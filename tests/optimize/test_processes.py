@@ -35,10 +35,14 @@ def test_results_depend_on_no_process(repository, folder):
 
 def test_one_thread_for_the_blas_while_designs_are_solved(repository):
     """Its sums would depend on how many cores there are."""
-    def threads() -> set[int]:
-        return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+    def threads() -> dict[str, int]:
+        return {library["filepath"]: library["num_threads"] for library in threadpool_info()
+                if library["user_api"] == "blas"}
 
+    pool = DesignPool(load_designs(repository / "models" / "small", 1))
     with threadpool_limits(2, user_api="blas"):
-        with DesignPool(load_designs(repository / "models" / "small", 1)):
-            assert threads() == {1}
-        assert threads() == {2}
+        before = threads()
+        assert set(before.values()) == {2}
+        with pool:
+            assert set(threads().values()) == {1}
+        assert {library: threads()[library] for library in before} == before  # others may have been loaded meanwhile
