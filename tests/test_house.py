@@ -3,8 +3,8 @@ import ast
 from pathlib import Path
 from typing import Iterator
 
-FOLDERS = ("errors", "memory", "rods", "scene", "equilibrium", "structures", "kit", "optimize", "analysis", "io",
-           "report", "commands", "cli")
+FOLDERS = ("errors", "memory", "plugins", "rods", "scene", "equilibrium", "structures", "kit", "optimize", "analysis",
+           "io", "report", "commands", "cli")
 
 
 def imported(file: Path, package: Path) -> Iterator[tuple[str, int]]:

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 from typing import Any
 
@@ -89,41 +90,42 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _c_shell(args: argparse.Namespace) -> dict[str, Any]:
-    from os.path import relpath
-
-    from ..errors import InputError
     from ..io.drawn_networks import c_shell_data, read_network
-    from ..structures.base import design_from_dict
 
     _require(args, "a C-shell", "opening", "section", "material")
     curves = read_network(args.file, args.layer, kind=args.curves, scale=args.scale, free_ends=args.free_ends)
     data = c_shell_data(args.file.stem, curves, _section(args), _material(args), args.opening,
                         free_ends=args.free_ends)
     if args.target is not None:
-        data["target"] = {"file": Path(relpath(args.target, args.out.parent)).as_posix()}
-    try:
-        design_from_dict(data, str(args.out))  # complains about what no C-shell can be made of; paths begin there
-    except InputError as error:
-        raise InputError(error.message, source=args.file, field=error.field, value=error.value) from None
-    return data
+        data["target"] = {"file": _from_the_design(args, args.target)}
+    return _checked(args, data)
 
 
 def _grid(args: argparse.Namespace) -> dict[str, Any]:
-    from os.path import relpath
-
     from ..errors import InputError
     from ..io.drawn_networks import grid_data, read_network
-    from ..structures.base import design_from_dict
 
     _require(args, "a grid", "surface", "section", "material")
     if args.scale != 1.0 or args.free_ends:
         raise InputError("not for grids", source=args.file, field="--free-ends" if args.free_ends else "--scale",
                          value=None if args.free_ends else args.scale)
     curves = read_network(args.file, args.layer, kind=args.curves)
-    surface = Path(relpath(args.surface, args.out.parent)).as_posix()
-    data = grid_data(args.file.stem, curves, _section(args), _material(args), surface, args.held)
+    return _checked(args, grid_data(args.file.stem, curves, _section(args), _material(args),
+                                    _from_the_design(args, args.surface), args.held))
+
+
+def _from_the_design(args: argparse.Namespace, file: Path) -> str:
+    """A file's path, relative to the design's."""
+    return Path(os.path.relpath(file, args.out.parent)).as_posix()
+
+
+def _checked(args: argparse.Namespace, data: dict[str, Any]) -> dict[str, Any]:
+    """The content of a design's file. Raises InputError, naming the drawing, where no design can be made of it."""
+    from ..errors import InputError
+    from ..structures.base import design_from_dict
+
     try:
-        design_from_dict(data, str(args.out))  # the surface's path is relative to the design's file
+        design_from_dict(data, str(args.out))
     except InputError as error:
         raise InputError(error.message, source=args.file, field=error.field, value=error.value) from None
     return data

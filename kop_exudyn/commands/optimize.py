@@ -33,8 +33,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--kit", type=Path, metavar="FILE",
                         help="build the designs from this kit (a kit.json), whose parts stay as they are")
     parser.add_argument("--weights", type=term_weights, metavar="TERM=W,...",
-                        help="of the objective's terms, as energy=0.05,stress=0.1 (terms: fit, energy, stress, share of "
-                        "the joints' own places in fit)")
+                        help="of the objective's terms, as energy=0.05,stress=0.1; share is that of the joints' own "
+                        "places in fit")
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the results")
     parser.add_argument("--designs", type=design_selection, metavar="N|NAMES",
                         help="the first N designs, or names of files without .json (default: all)")

@@ -7,27 +7,17 @@ import math
 
 def part_counts(text: str) -> dict[str, int]:
     """``linear=12,angular=5`` as {"linear": 12, "angular": 5}; whether there are such kinds is checked later."""
-    counts: dict[str, int] = {}
-    for piece in text.split(","):
-        kind, equals, number = (part.strip() for part in piece.partition("="))
-        if not kind or not equals:
-            raise argparse.ArgumentTypeError(f"expected KIND=NUMBER,..., got {piece!r}")
-        if kind in counts:
-            raise argparse.ArgumentTypeError(f"the kind {kind!r} is given twice")
-        counts[kind] = _whole(number, 1, f"the number of {kind} parts")
-    return counts
+    return {kind: _whole(number, 1, f"the number of {kind} parts")
+            for kind, number in _assignments(text, "kind", "KIND=NUMBER,...").items()}
 
 
 def term_weights(text: str) -> dict[str, float]:
     """``fit=1e4,energy=0.05`` as {"fit": 1e4, "energy": 0.05}; whether there are such terms is checked later."""
-    weights: dict[str, float] = {}
-    for piece in text.split(","):
-        name, equals, number = (part.strip() for part in piece.partition("="))
+    weights = {}
+    for name, number in _assignments(text, "term", "TERM=WEIGHT,...").items():
         value = _numbers(number, (1,))
-        if not name or not equals or not value:
-            raise argparse.ArgumentTypeError(f"expected TERM=WEIGHT,..., got {piece!r}")
-        if name in weights:
-            raise argparse.ArgumentTypeError(f"the term {name!r} is given twice")
+        if not value:
+            raise argparse.ArgumentTypeError(f"expected TERM=WEIGHT,..., got '{name}={number}'")
         weights[name] = value[0]
     return weights
 
@@ -100,6 +90,19 @@ def gravity(text: str) -> tuple[float, float, float]:
     if not numbers:
         raise argparse.ArgumentTypeError(f"expected a number or X,Y,Z, got {text!r}")
     return (0.0, 0.0, -numbers[0]) if len(numbers) == 1 else (numbers[0], numbers[1], numbers[2])
+
+
+def _assignments(text: str, what: str, form: str) -> dict[str, str]:
+    """``a=1,b=2`` as {"a": "1", "b": "2"}; what : are named, form : that is expected."""
+    found: dict[str, str] = {}
+    for piece in text.split(","):
+        name, equals, value = (part.strip() for part in piece.partition("="))
+        if not name or not equals:
+            raise argparse.ArgumentTypeError(f"expected {form}, got {piece!r}")
+        if name in found:
+            raise argparse.ArgumentTypeError(f"the {what} {name!r} is given twice")
+        found[name] = value
+    return found
 
 
 def _numbers(text: str, counts: tuple[int, ...]) -> list[float]:

@@ -7,6 +7,7 @@ its end gets a node of its own, tied rigidly to the other one.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -48,6 +49,13 @@ class Layout:
     carriers: dict[tuple[int, int], Carrier]
     ties: list[tuple[tuple[int, int], int, np.ndarray, np.ndarray]]
     levels: list[np.ndarray]
+
+    @cached_property
+    def carrier_arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """All carriers: bodies, hinges (-1: the body itself), nodes (n,) and frames (n, 3, 3)."""
+        items = list(self.carriers.values())
+        bodies, hinges, nodes = np.array([(c.body, c.hinge, c.node) for c in items], int).reshape(-1, 3).T
+        return bodies, hinges, nodes, np.array([c.frame for c in items]).reshape(-1, 3, 3)
 
     def reference_coordinates(self, scene: Scene, lengths: np.ndarray) -> np.ndarray:
         """(n_nodes, 6) positions and rotation vectors in which every rod is unstressed."""

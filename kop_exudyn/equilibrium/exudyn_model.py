@@ -10,7 +10,6 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass
 from time import perf_counter, process_time
-from typing import Iterable
 
 import numpy as np
 
@@ -69,22 +68,6 @@ class Confirmation:
                 "moved": self.moved, "wall_s": self.wall_s}
 
 
-@dataclass(frozen=True)
-class _Carried:
-    """The carriers as arrays: bodies, hinges (-1: the body itself), nodes (n,) and frames (n, 3, 3)."""
-
-    bodies: np.ndarray
-    hinges: np.ndarray
-    nodes: np.ndarray
-    frames: np.ndarray
-
-    @classmethod
-    def of(cls, carriers: Iterable[Carrier]) -> _Carried:
-        items = list(carriers)
-        numbers = np.array([(c.body, c.hinge, c.node) for c in items], int).reshape(-1, 3)
-        return cls(numbers[:, 0], numbers[:, 1], numbers[:, 2], np.array([c.frame for c in items]).reshape(-1, 3, 3))
-
-
 class ExudynModel:
     """Exudyn's model of one scene; `confirm` may be called for any equilibrium of that scene."""
 
@@ -102,7 +85,6 @@ class ExudynModel:
             self._add_loads()
             self._mbs.Assemble()
         self._settings = self._solver_settings()
-        self._carried = _Carried.of(self.layout.carriers.values())
 
     def confirm(self, equilibrium: Equilibrium) -> Confirmation:
         """Solve with Exudyn, starting from the equilibrium: Newton steps of its static solver, its residual at the end.
@@ -395,10 +377,10 @@ class ExudynModel:
     def _state(self, solution: np.ndarray, near: State) -> State:
         """The scene's state of Exudyn's coordinates; hinge angles on the same turn as those of a state nearby."""
         positions, rotations, angles = near.positions.copy(), near.rotations.copy(), near.angles.copy()
-        frames = exp_so3(solution[self._carried.nodes, 3:]) @ self._carried.frames.transpose(0, 2, 1)
-        bodies, hinges = self._carried.bodies, self._carried.hinges
+        bodies, hinges, nodes, own = self.layout.carrier_arrays
+        frames = exp_so3(solution[nodes, 3:]) @ own.transpose(0, 2, 1)
         hubs, turned = np.flatnonzero(hinges < 0), np.flatnonzero(hinges >= 0)
-        positions[bodies[hubs]] = solution[self._carried.nodes[hubs], :3] * self._length
+        positions[bodies[hubs]] = solution[nodes[hubs], :3] * self._length
         rotations[bodies[hubs]] = frames[hubs]
         turn = rotations[bodies[turned]].transpose(0, 2, 1) @ frames[turned]
         sine = np.stack([turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]], axis=1)

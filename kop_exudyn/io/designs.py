@@ -11,6 +11,7 @@ from ..structures.base import Design, design_from_dict
 from ..structures.umbrella import Umbrella
 from ..structures.umbrella_release import is_release
 from .documents import check_envelope, check_range, check_schema, has_schema
+from .files import reason_of
 from .json_files import read_json
 
 DESIGN_VERSION = 1
@@ -69,7 +70,7 @@ def design_files(folder: str | Path) -> list[Path]:
     try:
         names = os.listdir(folder)
     except OSError as error:
-        raise InputError(f"can't be read: {(error.strerror or str(error)).lower()}", source=folder) from None
+        raise InputError(f"can't be read: {reason_of(error)}", source=folder) from None
     found = [folder / name for name in names if name.endswith(_SUFFIXES) and not name.startswith(".")]
     if not found:
         raise InputError("contains no designs (files that end in .json or .json.gz)", source=folder)

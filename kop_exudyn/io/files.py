@@ -38,7 +38,7 @@ def read_bytes(path: str | Path, limit: int = SIZE_LIMIT) -> bytes:
     except (gzip.BadGzipFile, zlib.error, EOFError) as error:
         raise InputError(f"damaged gzip file: {error}", source=path) from None
     except OSError as error:
-        raise InputError(f"can't be read: {_reason(error)}", source=path) from None
+        raise InputError(f"can't be read: {reason_of(error)}", source=path) from None
     if len(content) > limit:
         raise InputError(f"larger than {limit / 2**20:g} MB", source=path)
     return content
@@ -63,7 +63,7 @@ def write_bytes(path: str | Path, content: bytes, *, overwrite: bool = False) ->
         os.chmod(temporary, 0o666 & ~_umask())
         os.replace(temporary, path)
     except OSError as error:
-        raise InputError(f"can't be written: {_reason(error)}", source=path) from None
+        raise InputError(f"can't be written: {reason_of(error)}", source=path) from None
     finally:
         if temporary is not None and os.path.exists(temporary):
             os.unlink(temporary)
@@ -104,7 +104,7 @@ def make_folder(path: str | Path) -> Path:
     except FileExistsError:
         raise InputError("is a file, expected a folder to write to", source=path) from None
     except OSError as error:
-        raise InputError(f"can't be written: {_reason(error)}", source=path) from None
+        raise InputError(f"can't be written: {reason_of(error)}", source=path) from None
     return path
 
 
@@ -115,5 +115,6 @@ def _umask() -> int:
     return mask
 
 
-def _reason(error: OSError) -> str:
+def reason_of(error: OSError) -> str:
+    """What the system says of it, as part of a sentence."""
     return (error.strerror or str(error)).lower()

@@ -13,6 +13,7 @@ from typing import Callable, Mapping, Sequence
 import numpy as np
 
 from ..errors import InputError
+from ..plugins import load_folder
 
 Bounds = Mapping[str, tuple]  # kind -> (lower, upper), each a number or an array (k_p,)
 
@@ -142,24 +143,14 @@ def register(kind: PartKind) -> PartKind:
 
 def kind_names() -> list[str]:
     """Names of all kinds, sorted."""
-    _load_folder()
+    load_folder(__package__)
     return sorted(_REGISTRY)
 
 
 def part_kind(name: str) -> PartKind:
     """The kind of that name; InputError when there is none."""
     if name not in _REGISTRY:
-        _load_folder()
+        load_folder(__package__)
     if name not in _REGISTRY:
         raise InputError(f"unknown kind of parts (known: {', '.join(sorted(_REGISTRY))})", field="parts", value=name)
     return _REGISTRY[name]
-
-
-def _load_folder() -> None:
-    """Import every module of this folder, so that a kind is added by adding its file."""
-    import importlib
-    import pkgutil
-
-    package = importlib.import_module(__package__)
-    for module in pkgutil.iter_modules(package.__path__):
-        importlib.import_module(f"{__package__}.{module.name}")

@@ -12,6 +12,7 @@ from typing import Any, Callable, ClassVar, Iterator, Mapping, TYPE_CHECKING, Ty
 import numpy as np
 
 from ..errors import InputError
+from ..plugins import load_folder
 from .load_case import LoadCase, load_case_from_dict
 
 if TYPE_CHECKING:
@@ -159,7 +160,7 @@ def register(class_name: str) -> Callable[[R], R]:
 
 def registered() -> Iterator[str]:
     """Names of all structure classes, those of this folder included."""
-    _load_folder()
+    load_folder(__package__)
     return iter(sorted(_REGISTRY))
 
 
@@ -170,7 +171,7 @@ def design_from_dict(data: Mapping[str, Any], source: str = "design") -> Design:
     """
     class_name = data.get("class") if isinstance(data, Mapping) else None
     if class_name not in _REGISTRY:
-        _load_folder()
+        load_folder(__package__)
     if class_name not in _REGISTRY:
         known = ", ".join(sorted(_REGISTRY))
         raise InputError(f"unknown structure class (known: {known})", source=source, field="class", value=class_name)
@@ -179,13 +180,3 @@ def design_from_dict(data: Mapping[str, Any], source: str = "design") -> Design:
         design.loads = load_case_from_dict(data)
         design.loads.check(len(design.joints), source)
     return design
-
-
-def _load_folder() -> None:
-    """Import every module of this folder, so that a class is added by adding its file."""
-    import importlib
-    import pkgutil
-
-    package = importlib.import_module(__package__)
-    for module in pkgutil.iter_modules(package.__path__):
-        importlib.import_module(f"{__package__}.{module.name}")

@@ -23,10 +23,10 @@ from ..equilibrium.system import System
 from ..errors import InputError, SimulationFailure
 from ..rods.sections import material_from_dict, section_from_dict
 from ..scene.scene import Scene
+from ..scene.surface import TriangleSurface
 from .base import Design, Role, Target, register
 from .c_shell_scenes import RodModel, lay_out, shell_scene
-from .mesh_files import read_mesh
-from .mesh_target import target_on_mesh
+from .mesh_target import load_target_mesh, target_on_mesh
 from .network import CurveNetwork, network_from_dict
 from .network_faces import triangulate
 
@@ -44,7 +44,7 @@ class CShell(Design):
     opening : rad, change of the mean opening angle from assembly to deployment
     side : 1 or -1, to which side of the plane it rises
     rest : "planar" or "imperfect", see the module
-    target_file : mesh to keep to, instead of the surface through the smooth design's deployed rods
+    target_mesh : surface to keep to, instead of the surface through the smooth design's deployed rods
 
     Raises InputError where one corner can't follow the curve between two joints, or the curves enclose no face.
     """
@@ -52,9 +52,9 @@ class CShell(Design):
     class_name = "c_shell"
 
     def __init__(self, name: str, network: CurveNetwork, model: RodModel, opening: float, *, side: int = 1,
-                 rest: str = "planar", target_file: Path | None = None):
+                 rest: str = "planar", target_mesh: TriangleSurface | None = None):
         self.name, self.network, self.model = name, network, model
-        self.opening, self.side, self.rest, self.target_file = opening, side, rest, target_file
+        self.opening, self.side, self.rest, self.target_mesh = opening, side, rest, target_mesh
         self.layout = lay_out(network, model.elements)
         numbering = self.layout.numbering
         self.parameters, self.groups, self.joints = numbering.parameters, numbering.groups, self.layout.joints
@@ -108,8 +108,8 @@ class CShell(Design):
         between joints would have creases exactly where the joints are.
         """
         state, flat = self.smooth_path[-1].state, self.layout.smooth[:, :2]
-        if self.target_file is not None:
-            return target_on_mesh(self.target_file, state.positions[self.joints])
+        if self.target_mesh is not None:
+            return target_on_mesh(self.target_mesh, state.positions[self.joints])
         vertices, faces = self.network.joints, self._triangles
         for _ in range(_REFINEMENTS):
             vertices, faces = _split(vertices, faces)
@@ -172,17 +172,9 @@ def read_c_shell(data: Mapping[str, Any], source: str) -> CShell:
         model = RodModel(section_from_dict(data["section"]), material_from_dict(data["material"]),
                          float(data.get("rod_offset", 0.0)), int(data.get("elements_per_piece", 2)))
         opening = data["opening"]
+        mesh = load_target_mesh(Path(source).parent / data["target"]["file"]) if "target" in data else None
         return CShell(data["name"], network_from_dict(data), model, float(opening["angle"]),
                       side=-1 if opening.get("side") == "down" else 1, rest=data.get("rest", "planar"),
-                      target_file=_target_file(data, source))
+                      target_mesh=mesh)
     except InputError as error:
         raise error.at(source) from None
-
-
-def _target_file(data: Mapping[str, Any], source: str) -> Path | None:
-    """The mesh that a design file names, its path relative to that file; read here once, to complain in time."""
-    if "target" not in data:
-        return None
-    path = Path(source).parent / data["target"]["file"]
-    read_mesh(path, "target.file")
-    return path

@@ -15,20 +15,22 @@ _MAX_ITERATIONS = 200
 _SETTLED = 1e-6  # of the joints' size, by which an iteration moves them
 
 
-def target_on_mesh(path: Path, joints: np.ndarray) -> Target:
-    """The mesh of a file, and for each joint (n, 3) a place on it.
+def load_target_mesh(path: Path) -> TriangleSurface:
+    """The mesh of a file. Raises InputError, naming the field "target.file", where it contains no usable one."""
+    vertices, faces = read_mesh(path, "target.file")
+    try:
+        return TriangleSurface(vertices, faces)
+    except InputError as error:
+        raise InputError(f"{error.message} ({error.field})", field="target.file", value=path.name) from None
+
+
+def target_on_mesh(surface: TriangleSurface, joints: np.ndarray) -> Target:
+    """A mesh as target, and for each joint (n, 3) a place on it.
 
     The joints are laid onto the mesh from where they are, by turns of closest points and best rigid motions (Besl and
     McKay, IEEE PAMI 14, 1992). So the mesh has to lie and face about as the joints do; the target fitting of every
     later state looks for the best placement by itself.
-
-    Raises InputError, naming the field "target.file", for files that contain no usable mesh.
     """
-    vertices, faces = read_mesh(path, "target.file")
-    try:
-        surface = TriangleSurface(vertices, faces)
-    except InputError as error:
-        raise InputError(f"{error.message} ({error.field})", field="target.file", value=path.name) from None
     size, laid = float(np.linalg.norm(np.ptp(joints, axis=0))), joints
     for _ in range(_MAX_ITERATIONS):
         goal, before = surface.closest(laid).points, laid

@@ -1,8 +1,6 @@
 """What a term of a design's objective offers: its value in a state, and its derivatives there."""
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar, Mapping, TypeVar
@@ -12,6 +10,7 @@ import numpy as np
 from ...equilibrium.newton import Equilibrium
 from ...equilibrium.sensitivities import Sensitivities
 from ...errors import InputError
+from ...plugins import load_folder
 from ...structures.base import Design, Role, Target
 from ..fitting import FitResult
 
@@ -76,7 +75,7 @@ def register(term: _Term) -> _Term:
 
 def term_names() -> list[str]:
     """Names of all terms: those that every objective has first, then the others, sorted."""
-    _load_folder()
+    load_folder(__package__)
     first = ["fit", "energy"]
     return first + sorted(set(_REGISTRY) - set(first))
 
@@ -84,14 +83,7 @@ def term_names() -> list[str]:
 def term_class(name: str) -> type[Term]:
     """The term of that name; InputError when there is none."""
     if name not in _REGISTRY:
-        _load_folder()
+        load_folder(__package__)
     if name not in _REGISTRY:
         raise InputError(f"unknown term of the objective (known: {', '.join(term_names())})", field="weights", value=name)
     return _REGISTRY[name]
-
-
-def _load_folder() -> None:
-    """Import every module of this folder, so that a term is added by adding its file."""
-    package = importlib.import_module(__package__)
-    for module in pkgutil.iter_modules(package.__path__):
-        importlib.import_module(f"{__package__}.{module.name}")

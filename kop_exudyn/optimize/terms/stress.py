@@ -44,9 +44,7 @@ class Stress(Term):
             raise InputError("the input design has no stress to compare with", source=design.name, field="weights.stress")
 
     def value(self, role: Role, equilibrium: Equilibrium, fit: FitResult | None = None) -> float:
-        u, share = self._squares(role, equilibrium)
-        largest = u.max(initial=0.0)
-        return largest * float(share @ (u / (largest or 1.0)) ** (_P / 2)) ** (2 / _P) / self._scale
+        return _p_mean(*self._squares(role, equilibrium)) / self._scale
 
     def gradient(self, role: Role, sensitivities: Sensitivities, fit: FitResult) -> np.ndarray:
         return sensitivities.stress_adjoint(self._by_stress(role, sensitivities.equilibrium)[0])
@@ -71,13 +69,19 @@ class Stress(Term):
         """dS/ds (E, 6), and the parts of d2S/ds2: a diagonal (E, 6), a vector (E, 6) an element, and of dS/ds itself."""
         form = self._forms[role.name]
         u, share = self._squares(role, equilibrium)
-        value = self.value(role, equilibrium)
+        value = _p_mean(u, share) / self._scale
         relative = u / (value * self._scale or 1.0)
         weight = share * relative ** (_P / 2 - 1) / self._scale
         slope = 2 * weight[:, None] * form * equilibrium.stress
         bend = 4 * (_P / 2 - 1) * share * relative ** (_P / 2 - 2) / (self._scale**2 * (value or 1.0))
         return (slope, 2 * weight[:, None] * form, np.sqrt(bend)[:, None] * form * equilibrium.stress,
                 (_P / 2 - 1) / (value or 1.0))
+
+
+def _p_mean(u: np.ndarray, share: np.ndarray) -> float:
+    """S of squares u (E,), in which no power overflows."""
+    largest = u.max(initial=0.0)
+    return largest * float(share @ (u / (largest or 1.0)) ** (_P / 2)) ** (2 / _P)
 
 
 def _quadratic_forms(scene: Scene) -> np.ndarray:
