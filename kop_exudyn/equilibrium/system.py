@@ -7,7 +7,9 @@ from time import perf_counter
 import numpy as np
 import scipy.sparse as sp
 
-from ..scene.assembly import ENERGY, GRADIENT, HESSIAN, assemble_rods, largest_forces, predict_stress, scatter_blocks
+from ..scene.assembly import (
+    ENERGY, GRADIENT, HESSIAN, assemble_rods, largest_forces, predict_stress, scatter_blocks, scratch_arrays,
+)
 from ..scene.scene import Scene
 from ..scene.sparsity import sparsity_of
 from ..scene.state import State
@@ -56,6 +58,7 @@ class System:
         self.factorisation = Factorisation()
         self.counters = Counters()
         self._weight = scene.weight if scene.weight is not None else np.zeros((0, 3))
+        self._scratch = scratch_arrays()
         self._matrix = s.free_matrix(self.values)
         self._plain = scene.plain_nodes
         self.metric = self._metric()
@@ -101,7 +104,7 @@ class System:
             order, state.positions, state.rotations, state.angles, scene.hinge_axis, scene.hinge_centre,
             scene.node_body, scene.node_hinge, self._plain, scene.node_frame, scene.node_offset, scene.elements,
             self.lengths, scene.rest_strain, scene.stiffness, self._weight, self.predicted_stress, mixed, s.rows,
-            s.slots, self.gradient, self.values, self.strain, self.strain_displacement,
+            s.slots, self.gradient, self.values, self.strain, self.strain_displacement, self._scratch,
         )
         potential = elastic + load
         for term, rows, slots in zip(scene.terms, s.term_rows, s.term_slots):

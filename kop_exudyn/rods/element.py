@@ -16,10 +16,11 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
+from .kernels import kernel
 from .rotations import bend_coefficient, log_into
 
 
-@nb.njit(cache=True, inline="always")
+@kernel(inline="always")
 def relative_motion(x0, R0, x1, R1, p, phi, R):
     """p and phi of the relative pose; R is scratch (3, 3)."""
     for r in range(3):
@@ -29,7 +30,7 @@ def relative_motion(x0, R0, x1, R1, p, phi, R):
     log_into(R, phi)
 
 
-@nb.njit(cache=True, inline="always")
+@kernel(inline="always")
 def add_hat(M, a, factor):
     """M += factor hat(a)."""
     M[0, 1] -= factor * a[2]
@@ -40,12 +41,12 @@ def add_hat(M, a, factor):
     M[2, 1] += factor * a[0]
 
 
-@nb.njit(cache=True, inline="always")
+@kernel(inline="always")
 def dot3(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@nb.njit(cache=True, inline="always")
+@kernel(inline="always")
 def stretch_measure(p, phi, c, u):
     """u = A(phi) p."""
     s, pp = dot3(phi, phi), dot3(phi, p)
@@ -54,7 +55,7 @@ def stretch_measure(p, phi, c, u):
     u[2] = p[2] - 0.5 * (phi[0] * p[1] - phi[1] * p[0]) + c * (phi[2] * pp - s * p[2])
 
 
-@nb.njit(cache=True)
+@kernel
 def strain_displacement(R0, p, phi, c, c1, A, D, B):
     """Fill A (3,3), D = d(A p)/dphi (3,3) and B (6,12) = d(u, phi)/d(dx_0, w_0, dx_1, w_1)."""
     s, pp = dot3(phi, phi), dot3(phi, p)
@@ -82,7 +83,7 @@ def strain_displacement(R0, p, phi, c, c1, A, D, B):
         B[r, 5] += A[r, 0] * p[1] - A[r, 1] * p[0]
 
 
-@nb.njit(cache=True, fastmath={"contract"})
+@kernel(fastmath={"contract"})
 def geometric_stiffness(R0, p, phi, c, c1, c2, A, sigma, X, T, H):
     """Add G(sigma), the stress part of the Hessian, to the blocks of w_0, dx_1, w_1 in H (12,12).
 
@@ -155,7 +156,7 @@ def geometric_stiffness(R0, p, phi, c, c1, c2, A, sigma, X, T, H):
         H[5, 6 + i] += f[0] * R0[i, 1] - f[1] * R0[i, 0]
 
 
-@nb.njit(cache=True)
+@kernel
 def element_energy(x0, R0, x1, R1, L, gamma, K, p, phi, R, e):
     """Elastic energy; leaves p, phi and e = h - L gamma (6,) behind."""
     relative_motion(x0, R0, x1, R1, p, phi, R)
@@ -170,7 +171,7 @@ def element_energy(x0, R0, x1, R1, L, gamma, K, p, phi, R, e):
     return 0.5 * W / L
 
 
-@nb.njit(cache=True, fastmath={"contract"})
+@kernel(fastmath={"contract"})
 def element_hessian(R0, L, K, p, phi, sigma, A, D, B, KB, X, T, H):
     """Fill B (6,12) and the symmetric H (12,12) = B^T (K/L) B + G(sigma). KB (6,12), X and T are scratch.
 

@@ -10,11 +10,13 @@ import math
 import numba as nb
 import numpy as np
 
+from .kernels import kernel
+
 # Below this squared angle the closed form of c loses digits to cancellation; the series is exact to round-off there.
 _SERIES_LIMIT = 0.25
 
 
-@nb.njit(cache=True, inline="always")
+@kernel(inline="always")
 def bend_coefficient(s):
     """c(s) = (1 - (t/2) cot(t/2)) / s with t = sqrt(s), and its first two derivatives in s.
 
@@ -38,7 +40,7 @@ def bend_coefficient(s):
     return c, c1, c2
 
 
-@nb.njit(cache=True, inline="always")
+@kernel(inline="always")
 def log_into(R, phi):
     """Write the rotation vector of R (angle at most pi) into phi, through the quaternion with the largest component."""
     trace = R[0, 0] + R[1, 1] + R[2, 2]
@@ -61,7 +63,7 @@ def log_into(R, phi):
     phi[0], phi[1], phi[2] = factor * x, factor * y, factor * z
 
 
-@nb.njit(cache=True, inline="always")
+@kernel(inline="always")
 def exp_into(w, R):
     """Write exp(hat(w)) into R (Rodrigues; half-angle form, so that no digits cancel at small angles)."""
     s = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
@@ -82,13 +84,13 @@ def exp_into(w, R):
     R[2, 1] += a * w[0]
 
 
-@nb.njit(cache=True)
+@kernel
 def _exp_all(w, out):
     for i in range(w.shape[0]):
         exp_into(w[i], out[i])
 
 
-@nb.njit(cache=True)
+@kernel
 def _log_all(R, out):
     for i in range(R.shape[0]):
         log_into(R[i], out[i])

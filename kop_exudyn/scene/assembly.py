@@ -3,16 +3,16 @@ from __future__ import annotations
 
 import math
 
-import numba as nb
 import numpy as np
 
 from ..rods.element import element_energy, element_hessian, strain_displacement
+from ..rods.kernels import kernel
 from ..rods.rotations import bend_coefficient
 
 ENERGY, GRADIENT, HESSIAN = 0, 1, 2
 
 
-@nb.njit(cache=True, inline="always")
+@kernel(inline="always")
 def node_pose(xb, Rb, h, angles, axes, centres, plain, C, o, x, R, EC, y):
     """Pose (x, R) of a node behind hinge h (-1: none), with EC = E(a) C and y = p + E(a) o left for the variations.
 
@@ -56,7 +56,7 @@ def node_pose(xb, Rb, h, angles, axes, centres, plain, C, o, x, R, EC, y):
             R[r, c] = Rb[r, 0] * EC[0, c] + Rb[r, 1] * EC[1, c] + Rb[r, 2] * EC[2, c]
 
 
-@nb.njit(cache=True, inline="always")
+@kernel(inline="always")
 def node_map(Rb, h, axes, centres, C, EC, y, T, d):
     """T (6,7): node increments (dx, w) from body increments and hinge angle, with d = n x (y - p) left behind.
 
@@ -82,7 +82,7 @@ def node_map(Rb, h, axes, centres, C, EC, y, T, d):
         T[3 + r, 6] = C[0, r] * n0 + C[1, r] * n1 + C[2, r] * n2
 
 
-@nb.njit(cache=True)
+@kernel
 def transform_columns(M, n_rows, at6, plain, T, out, at7):
     """out[:, at7:at7+7] = M[:, at6:at6+6] T, for the first n_rows rows."""
     for r in range(n_rows):
@@ -100,7 +100,7 @@ def transform_columns(M, n_rows, at6, plain, T, out, at7):
             out[r, at7 + c] = v
 
 
-@nb.njit(cache=True)
+@kernel
 def transform_rows(M, at6, plain, T, out, at7):
     """out[at7:at7+7, at7:] = T^T M[at6:at6+6, at7:], for 14 columns."""
     for c in range(at7, 14):
@@ -118,7 +118,7 @@ def transform_rows(M, at6, plain, T, out, at7):
             out[at7 + r, c] = v
 
 
-@nb.njit(cache=True)
+@kernel
 def map_curvature(Rb, h, axes, EC, y, T, d, force, moment, H, at):
     """Add the second variation of the node map, contracted with the node's force (global) and moment (node axes).
 
@@ -148,24 +148,27 @@ def map_curvature(Rb, h, axes, EC, y, T, d, force, moment, H, at):
     H[at + 6, at + 6] += f0 * (n1 * d[2] - n2 * d[1]) + f1 * (n2 * d[0] - n0 * d[2]) + f2 * (n0 * d[1] - n1 * d[0])
 
 
-@nb.njit(cache=True)
+def scratch_arrays() -> tuple[np.ndarray, ...]:
+    """The small arrays that `assemble_rods` works in, in the order in which it names them."""
+    poses = [3, 3, (3, 3), (3, 3), (3, 3), (3, 3), 3, 3, 3, 3, (6, 7), (6, 7)]
+    strains = [3, 3, (3, 3), (3, 3), (3, 3), (6, 12), (3, 9), (5, 3, 3), (6, 12)]
+    derivatives = [(12, 12), (12, 14), (14, 14), 12, 6]
+    return tuple(np.zeros(shape) for shape in poses + strains + derivatives)
+
+
+@kernel
 def assemble_rods(
     order, positions, rotations, angles, axes, centres, node_body, node_hinge, plain, frame, offset, elements, L, gamma,
-    K, weight, stress, mixed, rows, slots, gradient, values, strain, B14,
+    K, weight, stress, mixed, rows, slots, gradient, values, strain, B14, scratch,
 ):
     """Elastic energy and load potential; at GRADIENT also the gradient, at HESSIAN also values, and B14 (E,6,14).
 
     stress (E, 6) is used in the geometric part when mixed, else the current stress is. weight has no rows when the
-    scene has none. strain e (E, 6) is always written.
+    scene has none. strain e (E, 6) is always written. scratch : of `scratch_arrays`, for one caller at a time.
     """
-    x0, x1, R0, R1 = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
-    E0, E1, y0, y1 = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.zeros(3)
-    d0, d1 = np.zeros(3), np.zeros(3)
-    T0, T1 = np.empty((6, 7)), np.empty((6, 7))
-    p, phi, R = np.empty(3), np.empty(3), np.empty((3, 3))
-    A, D, KB, X, T = np.empty((3, 3)), np.empty((3, 3)), np.empty((6, 12)), np.empty((3, 9)), np.empty((5, 3, 3))
-    B, H, M, H14 = np.empty((6, 12)), np.empty((12, 12)), np.empty((12, 14)), np.zeros((14, 14))
-    G, sigma = np.empty(12), np.empty(6)
+    (x0, x1, R0, R1, E0, E1, y0, y1, d0, d1, T0, T1,
+     p, phi, R, A, D, KB, X, T, B,
+     H, M, H14, G, sigma) = scratch
     elastic = 0.0
     potential = 0.0
     weighted = weight.shape[0] > 0
@@ -233,7 +236,7 @@ def assemble_rods(
     return elastic, potential
 
 
-@nb.njit(cache=True)
+@kernel
 def scatter_gradient(G, at, plain, T, rows, gradient):
     """gradient[rows] += T^T G[at:at+6]."""
     for c in range(7):
@@ -248,7 +251,7 @@ def scatter_gradient(G, at, plain, T, rows, gradient):
         gradient[rows[c]] += v
 
 
-@nb.njit(cache=True)
+@kernel
 def scatter_blocks(rows, slots, g, H, second_order, gradient, values):
     """Add a term's block gradients (m, k) and symmetric Hessians (m, k, k)."""
     m, k = rows.shape
@@ -266,7 +269,7 @@ def scatter_blocks(rows, slots, g, H, second_order, gradient, values):
                 s += 1
 
 
-@nb.njit(cache=True)
+@kernel
 def predict_stress(strain, B14, rows, increment, K, L, stress):
     """stress = (K/L) (e + B d), the stress that a linear step d (over the kept unknowns) leads to."""
     for e in range(strain.shape[0]):
@@ -278,7 +281,7 @@ def predict_stress(strain, B14, rows, increment, K, L, stress):
             stress[e, r] = K[e, r] * v / L[e]
 
 
-@nb.njit(cache=True)
+@kernel
 def largest_forces(strain, K, L):
     """Largest force and moment in the elements, and largest K_0 / L; NaN where a strain is."""
     force, moment, stretch = 0.0, 0.0, 0.0
