@@ -1,8 +1,9 @@
 """Many sparse right-hand sides solved together with one sparse L D L^T: what sensitivities spend their time on.
 
 Columns of L with the same pattern (a body's six unknowns) are taken as one panel, so that a row of the work block that
-is loaded once serves six columns; right-hand sides go through in blocks that stay in the second-level cache; and the
-forward pass leaves out panels that no right-hand side of a block has reached (Gilbert and Peierls 1988).
+is loaded once serves six columns; what is left over, hinge angles mostly, goes column by column. Right-hand sides go
+through in blocks that stay in the second-level cache, and the forward pass leaves out panels that no right-hand side of
+a block has reached (Gilbert and Peierls 1988).
 """
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 _PANEL = 6  # most columns of a panel; the inner loops below are written out for it
-_BLOCK = 72  # right-hand sides of a block
+_BLOCK = 88  # right-hand sides of a block
 
 
 @nb.njit(cache=True)
@@ -76,9 +77,17 @@ def _solve_blocks(panels, indptr, indices, data, inverse, place, rhs_ptr, rhs_ro
                 reached[panel_of[i]] = True
         for s in range(len(panels) - 1):
             if reached[s]:
-                _forward(panels[s], panels[s + 1], indptr, indices, data, panel_of, work, panel, reached)
+                if panels[s + 1] - panels[s] == _PANEL:
+                    _forward_panel(panels[s], indptr, indices, data, work, panel)
+                else:
+                    _forward_columns(panels[s], panels[s + 1], indptr, indices, data, work)
+                for t in range(indptr[panels[s + 1] - 1], indptr[panels[s + 1]]):
+                    reached[panel_of[indices[t]]] = True
         for s in range(len(panels) - 2, -1, -1):
-            _backward(panels[s], panels[s + 1], indptr, indices, data, inverse, work, panel)
+            if panels[s + 1] - panels[s] == _PANEL:
+                _backward_panel(panels[s], indptr, indices, data, inverse, work, panel)
+            else:
+                _backward_columns(panels[s], panels[s + 1], indptr, indices, data, inverse, work)
         multiplier[:] = 0.0
         for t in range(len(constrained)):
             row, share = work[place[constrained[t]]], shares[t]
@@ -90,36 +99,69 @@ def _solve_blocks(panels, indptr, indices, data, inverse, place, rhs_ptr, rhs_ro
                 target[first + c] = row[c] - factor * multiplier[c]
 
 
-@nb.njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
-def _offsets(first, end, indptr):
-    """Where each of the panel's columns has its first entry below the panel; absent columns repeat the last one."""
-    last, w = end - 1, end - first
-    return (indptr[first] + w - 1, indptr[min(first + 1, last)] + max(w - 2, 0),
-            indptr[min(first + 2, last)] + max(w - 3, 0), indptr[min(first + 3, last)] + max(w - 4, 0),
-            indptr[min(first + 4, last)] + max(w - 5, 0), indptr[min(first + 5, last)])
+@nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _forward_columns(first, end, indptr, indices, data, work):
+    """Take what each solved row contributes from all rows below, one column of L after the other."""
+    for q in range(first, end):
+        own = work[q]
+        for t in range(indptr[q], indptr[q + 1]):
+            row, v = work[indices[t]], data[t]
+            for c in range(_BLOCK):
+                row[c] -= v * own[c]
 
 
 @nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _forward(first, end, indptr, indices, data, panel_of, work, panel, reached):
-    """Solve within a panel, then take its columns from all rows below. Absent columns are zero in `panel`."""
-    w = end - first
-    panel[w * _BLOCK:] = 0.0
-    for q in range(w):
-        own, row = panel[q * _BLOCK: (q + 1) * _BLOCK], work[first + q]
+def _backward_columns(first, end, indptr, indices, data, inverse, work):
+    """Divide rows by their pivots and take what the solved rows below contribute, one column of L after the other."""
+    for q in range(end - 1, first - 1, -1):
+        own, pivot = work[q], inverse[q]
+        for c in range(_BLOCK):
+            own[c] *= pivot
+        for t in range(indptr[q], indptr[q + 1]):
+            row, v = work[indices[t]], data[t]
+            for c in range(_BLOCK):
+                own[c] -= v * row[c]
+
+
+@nb.njit(cache=True, error_model="numpy", inline="always")
+def _within(first, indptr, data):
+    """L's entries within a panel, column by column."""
+    a, b, c, d, e = indptr[first], indptr[first + 1], indptr[first + 2], indptr[first + 3], indptr[first + 4]
+    return (data[a], data[a + 1], data[a + 2], data[a + 3], data[a + 4], data[b], data[b + 1], data[b + 2], data[b + 3],
+            data[c], data[c + 1], data[c + 2], data[d], data[d + 1], data[e])
+
+
+@nb.njit(cache=True, error_model="numpy", inline="always")
+def _below(first, indptr):
+    """Where each of the panel's columns has its first entry below the panel."""
+    return (indptr[first] + 5, indptr[first + 1] + 4, indptr[first + 2] + 3, indptr[first + 3] + 2,
+            indptr[first + 4] + 1, indptr[first + 5])
+
+
+@nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _forward_panel(first, indptr, indices, data, work, panel):
+    """Solve within a panel, then take its six columns from all rows below."""
+    for q in range(_PANEL):
+        row, own = work[first + q], panel[q * _BLOCK: (q + 1) * _BLOCK]
         for c in range(_BLOCK):
             own[c] = row[c]
-        for p in range(q):
-            v, other = data[indptr[first + p] + q - p - 1], panel[p * _BLOCK: (p + 1) * _BLOCK]
-            for c in range(_BLOCK):
-                own[c] -= v * other[c]
+    l10, l20, l30, l40, l50, l21, l31, l41, l51, l32, l42, l52, l43, l53, l54 = _within(first, indptr, data)
+    for c in range(_BLOCK):
+        x0 = panel[c]
+        x1 = panel[_BLOCK + c] - l10 * x0
+        x2 = panel[2 * _BLOCK + c] - l20 * x0 - l21 * x1
+        x3 = panel[3 * _BLOCK + c] - l30 * x0 - l31 * x1 - l32 * x2
+        x4 = panel[4 * _BLOCK + c] - l40 * x0 - l41 * x1 - l42 * x2 - l43 * x3
+        x5 = panel[5 * _BLOCK + c] - l50 * x0 - l51 * x1 - l52 * x2 - l53 * x3 - l54 * x4
+        panel[_BLOCK + c], panel[2 * _BLOCK + c], panel[3 * _BLOCK + c] = x1, x2, x3
+        panel[4 * _BLOCK + c], panel[5 * _BLOCK + c] = x4, x5
+    for q in range(1, _PANEL):
+        row, own = work[first + q], panel[q * _BLOCK: (q + 1) * _BLOCK]
         for c in range(_BLOCK):
             row[c] = own[c]
-    below = indptr[end - 1]
-    a0, a1, a2, a3, a4, a5 = _offsets(first, end, indptr)
-    for t in range(indptr[end] - below):
-        i = indices[below + t]
-        reached[panel_of[i]] = True
-        row = work[i]
+    a0, a1, a2, a3, a4, a5 = _below(first, indptr)
+    for t in range(indptr[first + _PANEL] - a5):
+        row = work[indices[a5 + t]]
         v0, v1, v2, v3, v4, v5 = data[a0 + t], data[a1 + t], data[a2 + t], data[a3 + t], data[a4 + t], data[a5 + t]
         for c in range(_BLOCK):
             row[c] -= (v0 * panel[c] + v1 * panel[_BLOCK + c] + v2 * panel[2 * _BLOCK + c]
@@ -127,20 +169,18 @@ def _forward(first, end, indptr, indices, data, panel_of, work, panel, reached):
 
 
 @nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _backward(first, end, indptr, indices, data, inverse, work, panel):
+def _backward_panel(first, indptr, indices, data, inverse, work, panel):
     """Divide a panel by its pivots, take all rows below from it, then solve within it."""
-    w = end - first
-    for q in range(w):
-        own, row, v = panel[q * _BLOCK: (q + 1) * _BLOCK], work[first + q], inverse[first + q]
+    for q in range(_PANEL):
+        row, own, pivot = work[first + q], panel[q * _BLOCK: (q + 1) * _BLOCK], inverse[first + q]
         for c in range(_BLOCK):
-            own[c] = v * row[c]
-    below = indptr[end - 1]
-    a0, a1, a2, a3, a4, a5 = _offsets(first, end, indptr)
-    m = indptr[end] - below
+            own[c] = pivot * row[c]
+    a0, a1, a2, a3, a4, a5 = _below(first, indptr)
+    m = indptr[first + _PANEL] - a5
     for t in range(0, m - m % 4, 4):
         # four rows at once, since storing the panel is what takes longest
-        w0, w1 = work[indices[below + t]], work[indices[below + t + 1]]
-        w2, w3 = work[indices[below + t + 2]], work[indices[below + t + 3]]
+        w0, w1 = work[indices[a5 + t]], work[indices[a5 + t + 1]]
+        w2, w3 = work[indices[a5 + t + 2]], work[indices[a5 + t + 3]]
         v00, v01, v02, v03 = data[a0 + t], data[a0 + t + 1], data[a0 + t + 2], data[a0 + t + 3]
         v10, v11, v12, v13 = data[a1 + t], data[a1 + t + 1], data[a1 + t + 2], data[a1 + t + 3]
         v20, v21, v22, v23 = data[a2 + t], data[a2 + t + 1], data[a2 + t + 2], data[a2 + t + 3]
@@ -156,20 +196,27 @@ def _backward(first, end, indptr, indices, data, inverse, work, panel):
             panel[4 * _BLOCK + c] -= v40 * r0 + v41 * r1 + v42 * r2 + v43 * r3
             panel[5 * _BLOCK + c] -= v50 * r0 + v51 * r1 + v52 * r2 + v53 * r3
     for t in range(m - m % 4, m):
-        row = work[indices[below + t]]
+        row = work[indices[a5 + t]]
         v0, v1, v2, v3, v4, v5 = data[a0 + t], data[a1 + t], data[a2 + t], data[a3 + t], data[a4 + t], data[a5 + t]
         for c in range(_BLOCK):
-            panel[c] -= v0 * row[c]
-            panel[_BLOCK + c] -= v1 * row[c]
-            panel[2 * _BLOCK + c] -= v2 * row[c]
-            panel[3 * _BLOCK + c] -= v3 * row[c]
-            panel[4 * _BLOCK + c] -= v4 * row[c]
-            panel[5 * _BLOCK + c] -= v5 * row[c]
-    for q in range(w - 1, -1, -1):
-        own, row = panel[q * _BLOCK: (q + 1) * _BLOCK], work[first + q]
-        for p in range(q + 1, w):
-            v, other = data[indptr[first + q] + p - q - 1], panel[p * _BLOCK: (p + 1) * _BLOCK]
-            for c in range(_BLOCK):
-                own[c] -= v * other[c]
+            r = row[c]
+            panel[c] -= v0 * r
+            panel[_BLOCK + c] -= v1 * r
+            panel[2 * _BLOCK + c] -= v2 * r
+            panel[3 * _BLOCK + c] -= v3 * r
+            panel[4 * _BLOCK + c] -= v4 * r
+            panel[5 * _BLOCK + c] -= v5 * r
+    l10, l20, l30, l40, l50, l21, l31, l41, l51, l32, l42, l52, l43, l53, l54 = _within(first, indptr, data)
+    for c in range(_BLOCK):
+        x5 = panel[5 * _BLOCK + c]
+        x4 = panel[4 * _BLOCK + c] - l54 * x5
+        x3 = panel[3 * _BLOCK + c] - l43 * x4 - l53 * x5
+        x2 = panel[2 * _BLOCK + c] - l32 * x3 - l42 * x4 - l52 * x5
+        x1 = panel[_BLOCK + c] - l21 * x2 - l31 * x3 - l41 * x4 - l51 * x5
+        x0 = panel[c] - l10 * x1 - l20 * x2 - l30 * x3 - l40 * x4 - l50 * x5
+        panel[c], panel[_BLOCK + c], panel[2 * _BLOCK + c] = x0, x1, x2
+        panel[3 * _BLOCK + c], panel[4 * _BLOCK + c] = x3, x4
+    for q in range(_PANEL):
+        row, own = work[first + q], panel[q * _BLOCK: (q + 1) * _BLOCK]
         for c in range(_BLOCK):
             row[c] = own[c]

@@ -135,15 +135,19 @@ class Sensitivities:
         twice = np.zeros(scene.n_parameters)
         factor = scene.length_factor[self._has]
         np.add.at(twice, scene.length_parameter[self._has], factor**2 * self._energy_LL[self._has])
-        explicit = np.diag(twice)
+        explicit = sp.diags_array(twice)
         driven = self._driven_map
         if driven.shape[0]:
             upper = self.system.sparsity.driven_columns(self._driven_values)[1]
             block = upper + sp.triu(upper, 1).T
-            lengths_driven = (driven.T @ self._lengths_in_driven()).toarray()
-            explicit += lengths_driven + lengths_driven.T + (driven.T @ block @ driven).toarray()
-        hessian = explicit + self._residual_q.T @ self.full
-        return 0.5 * (hessian + hessian.T)
+            lengths_driven = driven.T @ self._lengths_in_driven()
+            explicit = explicit + (lengths_driven + lengths_driven.T + driven.T @ block @ driven)
+        explicit = explicit.tocoo()
+        hessian = self._residual_q.T @ self.full
+        hessian[explicit.row, explicit.col] += explicit.data  # the only dense sum: these matrices are large
+        hessian += hessian.T
+        hessian *= 0.5
+        return hessian
 
     @property
     def energy_hessian(self) -> np.ndarray:
