@@ -7,6 +7,8 @@ a block has reached (Gilbert and Peierls 1988).
 """
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numba as nb
 import numpy as np
 import scipy.sparse as sp
@@ -32,11 +34,37 @@ def panels_of(indptr: np.ndarray, indices: np.ndarray) -> np.ndarray:
     return starts[: count + 1].copy()
 
 
+@dataclass(frozen=True)
+class Solutions:
+    """Solutions (n, count) as the solver leaves them: to copy them into one array would take a quarter of its time.
+
+    blocks : (n_blocks, n, _BLOCK) some columns a block, rows in the order of the elimination
+    place : (n,) where each row is in a block
+    count : number of solutions; what the last block has beyond them is zero
+    """
+
+    blocks: np.ndarray
+    place: np.ndarray
+    count: int
+
+    def rows(self, numbers: np.ndarray) -> np.ndarray:
+        """Some rows (m, count) of the solutions."""
+        out = np.empty((len(numbers), self.count))
+        _gather(self.blocks, self.place[numbers], out)
+        return out
+
+    def product(self, matrix: sp.csr_matrix) -> np.ndarray:
+        """A sparse matrix (m, n) times the solutions, (m, count)."""
+        out = np.zeros((matrix.shape[0], self.count))
+        _multiply(matrix.indptr, self.place[matrix.indices], matrix.data, self.blocks, out)
+        return out
+
+
 def solve_columns(
     L: sp.csc_matrix, pivots: np.ndarray, order: np.ndarray, panels: np.ndarray, rhs: sp.csc_matrix,
     constraint: np.ndarray | None = None, column: np.ndarray | None = None,
-) -> np.ndarray:
-    """A^-1 rhs (n, k) with A = P L D L^T P^T and rhs sparse (n, k); with a constraint c (n,) and `column` = A^-1 c,
+) -> Solutions:
+    """A^-1 rhs with A = P L D L^T P^T and rhs sparse (n, k); with a constraint c (n,) and `column` = A^-1 c (n,),
     the solutions d of A d + c t = rhs, c.d = 0.
 
     Every t comes from the solution that it corrects: where A is nearly singular, what rounding leaves of its softest
@@ -45,32 +73,32 @@ def solve_columns(
     n, k = rhs.shape
     place = np.empty(n, np.int64)
     place[order] = np.arange(n)
-    out = np.empty((n, k))
-    if constraint is None:
-        constrained, shares, column = np.empty(0, np.int64), np.empty(0), np.zeros(n)
+    blocks = np.empty((-(-k // _BLOCK), n, _BLOCK))
+    if constraint is None or column is None:
+        constrained, shares, column = np.empty(0, np.int64), np.empty(0), np.empty(0)
     else:
         constrained = np.flatnonzero(constraint)
         shares = constraint[constrained] / (constraint @ column)
     _solve_blocks(panels, L.indptr, L.indices, L.data, 1 / pivots, place, rhs.indptr, rhs.indices, rhs.data,
-                  constrained, shares, column, out)
-    return out
+                  constrained, shares, column, blocks)
+    return Solutions(blocks, place, k)
 
 
 @nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _solve_blocks(panels, indptr, indices, data, inverse, place, rhs_ptr, rhs_rows, rhs_values, constrained, shares,
-                  column, out):
-    """Blocks of right-hand sides, one after the other: scatter, forward, backward, gather."""
-    n, total = out.shape
-    work, panel, multiplier = np.empty((n, _BLOCK)), np.empty(_PANEL * _BLOCK), np.empty(_BLOCK)
+                  column, blocks):
+    """Blocks of right-hand sides, one after the other: scatter, forward, backward, and what the constraint asks for."""
+    n, total = len(place), len(rhs_ptr) - 1
+    panel, multiplier = np.empty(_PANEL * _BLOCK), np.empty(_BLOCK)
     reached = np.empty(len(panels), np.bool_)
     panel_of = np.empty(n, np.int64)
     for s in range(len(panels) - 1):
         panel_of[panels[s]: panels[s + 1]] = s
-    for first in range(0, total, _BLOCK):
-        k = min(_BLOCK, total - first)
+    for b in range(len(blocks)):
+        work, first = blocks[b], b * _BLOCK
         work[:] = 0.0
         reached[:] = False
-        for c in range(k):
+        for c in range(min(_BLOCK, total - first)):
             for t in range(rhs_ptr[first + c], rhs_ptr[first + c + 1]):
                 i = place[rhs_rows[t]]
                 work[i, c] += rhs_values[t]
@@ -88,15 +116,43 @@ def _solve_blocks(panels, indptr, indices, data, inverse, place, rhs_ptr, rhs_ro
                 _backward_panel(panels[s], indptr, indices, data, inverse, work, panel)
             else:
                 _backward_columns(panels[s], panels[s + 1], indptr, indices, data, inverse, work)
+        if len(constrained) == 0:
+            continue
         multiplier[:] = 0.0
         for t in range(len(constrained)):
             row, share = work[place[constrained[t]]], shares[t]
-            for c in range(k):
+            for c in range(_BLOCK):
                 multiplier[c] += share * row[c]
         for i in range(n):
-            row, target, factor = work[place[i]], out[i], column[i]
+            row, factor = work[place[i]], column[i]
+            for c in range(_BLOCK):
+                row[c] -= factor * multiplier[c]
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _multiply(indptr, places, data, blocks, out):
+    """out (m, k) += a sparse matrix (m, n), its columns as places in the blocks, times the solutions."""
+    for b in range(len(blocks)):
+        first = b * _BLOCK
+        k = min(_BLOCK, out.shape[1] - first)
+        for i in range(len(indptr) - 1):
+            target = out[i]
+            for t in range(indptr[i], indptr[i + 1]):
+                row, v = blocks[b, places[t]], data[t]
+                for c in range(k):
+                    target[first + c] += v * row[c]
+
+
+@nb.njit(cache=True, error_model="numpy")
+def _gather(blocks, places, out):
+    """out (m, k) = the rows at some places of the blocks."""
+    for b in range(len(blocks)):
+        first = b * _BLOCK
+        k = min(_BLOCK, out.shape[1] - first)
+        for i in range(len(places)):
+            row, target = blocks[b, places[i]], out[i]
             for c in range(k):
-                target[first + c] = row[c] - factor * multiplier[c]
+                target[first + c] = row[c]
 
 
 @nb.njit(cache=True, error_model="numpy", fastmath={"contract"})

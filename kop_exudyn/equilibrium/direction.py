@@ -57,7 +57,7 @@ def border_of(system: System) -> Border | None:
         return None
     if system.singular:
         return Border(np.full(system.n_unknowns, np.nan), 0.0)
-    column = system.solve(system.constraint)
+    column = system.solve_constraint()
     return Border(column, float(system.constraint @ column))
 
 

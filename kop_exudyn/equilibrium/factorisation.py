@@ -5,7 +5,7 @@ import numpy as np
 import qdldl
 import scipy.sparse as sp
 
-from .block_solve import panels_of, solve_columns
+from .block_solve import Solutions, panels_of, solve_columns
 
 
 class Factorisation:
@@ -49,7 +49,7 @@ class Factorisation:
 
     def solve_columns(
         self, rhs: sp.csc_matrix, constraint: np.ndarray | None = None, column: np.ndarray | None = None
-    ) -> np.ndarray:
+    ) -> Solutions:
         """Solve for many sparse right-hand sides (n, k), bordered by a constraint (n,) if its column is given too."""
         assert self._factors is not None
         L, pivots, order = self._factors

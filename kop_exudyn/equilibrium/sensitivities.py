@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from ..rods.element import length_derivative
 from ..scene.scene import Scene
 from ..scene.state import State
+from .block_solve import Solutions
 from .direction import border_of, bordered_solve
 from .newton import Equilibrium, Start
 from .system import System
@@ -50,16 +51,21 @@ class Sensitivities:
 
     # -- states ----------------------------------------------------------------------------------------------------
     @cached_property
-    def full(self) -> np.ndarray:
+    def solutions(self) -> Solutions:
         """x_q (n_free, n_parameters): all free unknowns in all parameters; angles in rad, translations global."""
         return self.system.solve_columns(-self._residual_q, None if self._border is None else self._border.column)
+
+    @property
+    def full(self) -> np.ndarray:
+        """x_q as one array (n_free, n_parameters), copied from the solutions each time."""
+        return self.solutions.rows(np.arange(self._n))
 
     def rows(self, dofs: np.ndarray) -> np.ndarray:
         """Derivatives (m, n_parameters) of any unknowns of the scene, pinned (zero) and driven ones included."""
         kept = self.system.sparsity.kept[dofs]
         out = np.zeros((len(kept), self.system.scene.n_parameters))
         free = (kept >= 0) & (kept < self._n)
-        out[free] = self.full[kept[free]]
+        out[free] = self.solutions.rows(kept[free])
         driven = kept >= self._n
         out[driven] = self._driven_map[kept[driven] - self._n].toarray()
         return out
@@ -143,7 +149,7 @@ class Sensitivities:
             lengths_driven = driven.T @ self._lengths_in_driven()
             explicit = explicit + (lengths_driven + lengths_driven.T + driven.T @ block @ driven)
         explicit = explicit.tocoo()
-        hessian = self._residual_q.T @ self.full
+        hessian = self.solutions.product(self._residual_q.T)
         hessian[explicit.row, explicit.col] += explicit.data  # the only dense sum: these matrices are large
         hessian += hessian.T
         hessian *= 0.5

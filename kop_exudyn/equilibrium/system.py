@@ -13,6 +13,7 @@ from ..scene.assembly import (
 from ..scene.scene import Scene
 from ..scene.sparsity import sparsity_of
 from ..scene.state import State
+from .block_solve import Solutions
 from .factorisation import Factorisation
 
 
@@ -64,6 +65,7 @@ class System:
         self.metric = self._metric()
         self.constraint = self._constraint()
         self._forces: tuple[float, float] | None = None  # of the state assembled last
+        self._constraint_solution: np.ndarray | None = None  # of the factorisation at hand
         self.factorised_at: State | None = None  # where the unshifted, unmixed Hessian at hand was factorised
         self.is_rotation = self._dof_is_rotation()[s.free]
         self.rotations = np.flatnonzero(self.is_rotation)  # taking numbers is quicker than a mask
@@ -138,6 +140,7 @@ class System:
             diagonal = self.values[self.sparsity.diagonal]
             self.values[self.sparsity.diagonal] = diagonal + shift * self.metric
         negative = self.factorisation.update(self._matrix)
+        self._constraint_solution = None
         if shift:
             self.values[self.sparsity.diagonal] = diagonal
         self.factorised_at = None
@@ -153,7 +156,14 @@ class System:
         self.counters.solve_s += perf_counter() - begin
         return found
 
-    def solve_columns(self, rhs: sp.csc_matrix, column: np.ndarray | None = None) -> np.ndarray:
+    def solve_constraint(self) -> np.ndarray:
+        """K^-1 c (n_free,) of the constraint c with the factorisation at hand, solved for once."""
+        assert self.constraint is not None
+        if self._constraint_solution is None:
+            self._constraint_solution = self.solve(self.constraint)
+        return self._constraint_solution
+
+    def solve_columns(self, rhs: sp.csc_matrix, column: np.ndarray | None = None) -> Solutions:
         """Solutions (n_free, k) for many sparse right-hand sides; with column = K^-1 c on the constraint's kernel."""
         self.counters.solves += rhs.shape[1]
         return self.factorisation.solve_columns(rhs, None if column is None else self.constraint, column)

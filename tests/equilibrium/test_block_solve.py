@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from kop_exudyn.equilibrium.block_solve import panels_of
+from kop_exudyn.equilibrium.block_solve import Solutions, panels_of
 from kop_exudyn.equilibrium.factorisation import Factorisation
 
 
@@ -18,6 +18,10 @@ def chain(bodies: int, size: int, seed: int) -> sp.csc_matrix:
     return sp.csc_matrix(symmetric + np.diag(1 + np.abs(symmetric).sum(axis=1)))
 
 
+def whole(solutions: Solutions) -> np.ndarray:
+    return solutions.rows(np.arange(len(solutions.place)))
+
+
 @pytest.mark.parametrize("bodies, size, count", [(30, 6, 200), (25, 7, 72), (40, 1, 5), (1, 3, 1), (12, 4, 73)])
 def test_same_as_a_dense_solve(bodies, size, count):
     matrix = chain(bodies, size, seed=bodies)
@@ -26,7 +30,12 @@ def test_same_as_a_dense_solve(bodies, size, count):
     rng = np.random.default_rng(1)
     rhs = sp.random(matrix.shape[0], count, density=0.05, random_state=rng, format="csc")
     expected = np.linalg.solve(matrix.toarray(), rhs.toarray())
-    np.testing.assert_allclose(factorisation.solve_columns(rhs), expected, rtol=1e-10, atol=1e-14)
+    solutions = factorisation.solve_columns(rhs)
+    np.testing.assert_allclose(whole(solutions), expected, rtol=1e-10, atol=1e-14)
+    some = rng.integers(matrix.shape[0], size=5)
+    assert np.array_equal(solutions.rows(some), whole(solutions)[some])
+    sparse = sp.random(7, matrix.shape[0], density=0.2, random_state=rng, format="csr")
+    np.testing.assert_allclose(solutions.product(sparse), sparse @ whole(solutions), rtol=1e-10, atol=1e-13)
 
 
 def test_a_border_makes_up_for_a_matrix_that_is_nearly_singular():
@@ -40,7 +49,7 @@ def test_a_border_makes_up_for_a_matrix_that_is_nearly_singular():
     expected = np.linalg.solve(bordered, np.vstack([rhs, np.zeros(80)]))[:n]
     factorisation = Factorisation()
     factorisation.update(sp.csc_matrix(np.triu(matrix)))
-    found = factorisation.solve_columns(sp.csc_matrix(rhs), constraint, factorisation.solve(constraint))
+    found = whole(factorisation.solve_columns(sp.csc_matrix(rhs), constraint, factorisation.solve(constraint)))
     np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-5)
     np.testing.assert_allclose(constraint @ found, 0.0, atol=1e-5)
 
@@ -49,9 +58,9 @@ def test_indefinite_matrices_and_no_right_hand_sides():
     factorisation = Factorisation()
     matrix = sp.csc_matrix(np.array([[1.0, 2, 0], [2, 1, 1], [0, 1, 3]]))
     assert factorisation.update(sp.triu(matrix, format="csc")) == 1
-    inverse = factorisation.solve_columns(sp.identity(3, format="csc"))
+    inverse = whole(factorisation.solve_columns(sp.identity(3, format="csc")))
     np.testing.assert_allclose(matrix @ inverse, np.eye(3), atol=1e-12)
-    assert factorisation.solve_columns(sp.csc_matrix((3, 0))).shape == (3, 0)
+    assert whole(factorisation.solve_columns(sp.csc_matrix((3, 0)))).shape == (3, 0)
 
 
 def test_panels_are_columns_of_one_pattern():
