@@ -51,7 +51,7 @@ def main() -> None:
     if built:
         best = min(built, key=lambda row: row["reassigned J"])
         finding = (f"{design.name} deviates by {shown(direct)} when its elements become their nearest parts, by "
-                   f"{shown(best['built max %'])} when they are relaxed before (w_c = {best['w_c']:g} times the "
+                   f"{shown(best['built max %'])} when they are relaxed before (w_c = {best['w_c']:.3g} times the "
                    f"weight of the fit), and by {shown(best['reassigned max %'])} after exchanges; "
                    f"{best['reassigned changes']} of its {design.n_elements} elements then have other parts than "
                    "in the direct projection.")
