@@ -1,4 +1,5 @@
 """Settings of the documentation's site: ``sphinx-build -W docs out/site``."""
+
 from __future__ import annotations
 
 import re
@@ -33,11 +34,21 @@ autodoc_member_order = "bysource"
 
 
 def _as_written(app, what, name, obj, options, lines: list[str]) -> None:
-    """Docstrings are plain text, not reStructuredText: the first paragraph as text, all others as they are written."""
+    """Docstrings are plain text, not reStructuredText: the first paragraph as text, all others as
+    they are written."""
     end = lines.index("") if "" in lines else len(lines)
-    summary = [re.sub(r"([\\*|]|_(?!\w))", r"\\\1", line.replace("``", "`")) for line in lines[:end]]
-    rest = [f"   {line}".replace("``", "`").replace("  # doctest: +SKIP", "") for line in lines[end + 1:]]
-    lines[:] = [*summary, "", *([".. code-block:: text", "", *rest, ""] if any(line.strip() for line in rest) else [])]
+    summary = [
+        re.sub(r"([\\*|]|_(?!\w))", r"\\\1", line.replace("``", "`")) for line in lines[:end]
+    ]
+    rest = [
+        f"   {line}".replace("``", "`").replace("  # doctest: +SKIP", "")
+        for line in lines[end + 1 :]
+    ]
+    lines[:] = [
+        *summary,
+        "",
+        *([".. code-block:: text", "", *rest, ""] if any(line.strip() for line in rest) else []),
+    ]
 
 
 def setup(app) -> None:

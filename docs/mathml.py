@@ -1,4 +1,6 @@
-"""Formulas as MathML, which browsers draw themselves: pages need neither the network nor scripts."""
+"""Formulas as MathML, which browsers draw themselves: pages need neither the network nor
+scripts."""
+
 from __future__ import annotations
 
 from typing import Any

@@ -1,33 +1,57 @@
-"""The directive ``{fields} CLASS``: a table of a design file's fields, made from the class's JSON Schema."""
+"""The directive ``{fields} CLASS``: a table of a design file's fields, made from the class's JSON
+Schema."""
+
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from importlib.resources import files
-from typing import Any, Iterator
+from typing import Any
 
 from docutils import nodes
 from docutils.parsers.rst import Directive
 
-_LIMITS = {"minimum": "≥ {}", "exclusiveMinimum": "> {:.4g}", "maximum": "≤ {}", "exclusiveMaximum": "< {:.4g}",
-           "minItems": "at least {}", "maxItems": "at most {}"}
+_LIMITS = {
+    "minimum": "≥ {}",
+    "exclusiveMinimum": "> {:.4g}",
+    "maximum": "≤ {}",
+    "exclusiveMaximum": "< {:.4g}",
+    "minItems": "at least {}",
+    "maxItems": "at most {}",
+}
 _OPTIONAL = ", optional"
-_SHARED = {"point2": "[x, y]", "point3": "[x, y, z]", "positive": "number > 0", "name": "text",
-           "material": "object", "section": "object"}
+_SHARED = {
+    "point2": "[x, y]",
+    "point3": "[x, y, z]",
+    "positive": "number > 0",
+    "name": "text",
+    "material": "object",
+    "section": "object",
+}
 
 
 def schema(name: str) -> dict[str, Any]:
     """The schema of a structure class, or "design": what all of them have."""
-    folder, suffix = ("io", "schemas/design.schema.json") if name == "design" else ("structures", f"{name}.schema.json")
+    folder, suffix = (
+        ("io", "schemas/design.schema.json")
+        if name == "design"
+        else (f"structures/{name}", f"{name}.schema.json")
+    )
     return json.loads((files("kop_exudyn") / folder / suffix).read_text(encoding="utf-8"))
 
 
 def rows(content: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, str, str]]:
-    """(field, type and limits, description) of all fields; fields of a field have its name before a dot."""
+    """(field, type and limits, description) of all fields; fields of a field have its name before a
+    dot."""
     required = content.get("required", ())
     for name, value in content.get("properties", {}).items():
         if isinstance(value, dict):
             field = f"{prefix}{name}"
-            yield field, _kind(value) + ("" if name in required else _OPTIONAL), value.get("description", "")
+            yield (
+                field,
+                _kind(value) + ("" if name in required else _OPTIONAL),
+                value.get("description", ""),
+            )
             yield from rows(_defined(value), f"{field}.")
             if isinstance(items := value.get("items"), dict):
                 yield from rows(items, f"{field}[].")
@@ -75,7 +99,10 @@ def _table(head: tuple[str, ...], body) -> nodes.table:
 
 
 def _row(cells, code: bool = False) -> nodes.row:
-    made = [nodes.literal(text=cell) if code and not k else nodes.Text(cell) for k, cell in enumerate(cells)]
+    made = [
+        nodes.literal(text=cell) if code and not k else nodes.Text(cell)
+        for k, cell in enumerate(cells)
+    ]
     return nodes.row("", *(nodes.entry("", nodes.paragraph("", "", cell)) for cell in made))
 
 

@@ -1,7 +1,9 @@
-"""The tutorial's steps, taken from its page: files to save and commands to run. As a program: makes its figures anew.
+"""The tutorial's steps, taken from its page: files to save and commands to run. As a program: makes
+its figures anew.
 
 Run it from anywhere: python docs/tutorial_steps.py
 """
+
 from __future__ import annotations
 
 import os
@@ -16,16 +18,24 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent
 PAGE = DOCS / "tutorial.md"
 FIGURES = DOCS / "tutorial"  # named as the files that the commands write, with "_" for "/"
-_BLOCK = re.compile(r"^```\{code-block\} (python|console)\n((?::\w+:[^\n]*\n)*)\n?(.*?)^```$", re.MULTILINE | re.DOTALL)
+_BLOCK = re.compile(
+    r"^```\{code-block\} (python|console)\n((?::\w+:[^\n]*\n)*)\n?(.*?)^```$",
+    re.MULTILINE | re.DOTALL,
+)
 _CAPTION = re.compile(r":caption: (\S+)")
 _FIGURE = re.compile(r"\]\(tutorial/(\S+?)\)\n+\*`(\S+?)`")
-_PROGRAMS = {"kop": [sys.executable, "-m", "kop_exudyn"], "python": [sys.executable], "mkdir": ["mkdir"],
-             "cat": ["cat"]}
+_PROGRAMS = {
+    "kop": [sys.executable, "-m", "kop_exudyn"],
+    "python": [sys.executable],
+    "mkdir": ["mkdir"],
+    "cat": ["cat"],
+}
 
 
 @dataclass(frozen=True)
 class Step:
-    """A file to save (`command` is None, `text` its content), or a command and the output that the page shows."""
+    """A file to save (`command` is None, `text` its content), or a command and the output that the
+    page shows."""
 
     command: str | None
     file: str
@@ -57,8 +67,13 @@ def take(step: Step, folder: Path) -> subprocess.CompletedProcess | None:
         return None
     program, *rest = shlex.split(step.command)
     path = os.pathsep.join(filter(None, (str(DOCS.parent), os.environ.get("PYTHONPATH"))))
-    return subprocess.run([*_PROGRAMS[program], *rest], cwd=folder, capture_output=True, text=True,
-                          env={**os.environ, "PYTHONPATH": path})
+    return subprocess.run(
+        [*_PROGRAMS[program], *rest],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": path},
+    )
 
 
 def make_figures() -> None:
@@ -71,12 +86,16 @@ def make_figures() -> None:
         for step in steps(page):
             done = take(step, Path(name))
             if done is not None:
-                sys.stdout.write(f"$ {step.command}\n{done.stdout}{done.stderr if done.returncode else ''}")
+                sys.stdout.write(
+                    f"$ {step.command}\n{done.stdout}{done.stderr if done.returncode else ''}"
+                )
                 done.check_returncode()
         for figure, made in figures(page).items():
             source = Path(name) / made
             if source.suffix == ".png":
-                Image.open(source).convert("RGB").quantize(256).save(FIGURES / figure, optimize=True)
+                Image.open(source).convert("RGB").quantize(256).save(
+                    FIGURES / figure, optimize=True
+                )
             else:
                 (FIGURES / figure).write_bytes(source.read_bytes())
 

@@ -6,6 +6,7 @@ The names below are loaded at first use, so that ``import kop_exudyn`` costs mil
 >>> design = kop.load_design("models/conformals/01_sinh.json")  # doctest: +SKIP
 >>> kop.simulate(design).fit.max_percent  # doctest: +SKIP
 """
+
 from __future__ import annotations
 
 from importlib import import_module
@@ -16,25 +17,26 @@ __version__ = "0.1.0"
 # module -> the public names that it holds
 _PUBLIC = {
     "errors": ("InputError", "SimulationFailure"),
-    "structures.base": ("Design", "ElementGroup", "design_from_dict"),
-    "structures.load_case": ("LoadCase",),
+    "kit.groups": ("ElementGroup",),
+    "structures.base": ("Design", "design_from_dict"),
+    "structures.loads": ("LoadCase",),
     "kit.parts": ("Assignment", "Kit"),
     "kit.cluster": ("cluster",),
-    "optimize.input_fit": ("fit_input",),
-    "optimize.job": ("JobSettings", "run_job"),
-    "optimize.objective": ("Weights",),
-    "optimize.stages": ("StageSettings",),
+    "search.input_fit": ("fit_input",),
+    "search.job": ("JobSettings", "run_job"),
+    "search.objective": ("Weights",),
+    "search.settings": ("StageSettings",),
     "equilibrium.sensitivities": ("Sensitivities",),
-    "analysis.kit_result": ("KitResult",),
-    "analysis.new_design": ("project_design",),
+    "search.result": ("KitResult",),
     "analysis.simulation": ("SimulationResult", "simulate"),
-    "io.designs": ("load_design", "load_designs"),
-    "io.export": ("export_desk", "export_workshop"),
+    "io.datasets": ("load_designs",),
+    "io.designs": ("load_design",),
+    "exchange.export": ("export_desk", "export_workshop"),
     "io.kits": ("load_kit", "save_kit"),
-    "io.pieces": ("parts_list_of",),
+    "fabrication.pieces": ("parts_list_of",),
     "io.results": ("load_result",),
     "io.saved_runs": ("load_run",),
-    "io.templates": ("CutOptions",),
+    "fabrication.templates": ("CutOptions",),
     "report.kit_run": ("optimize_kit",),
 }
 _MODULE_OF = {name: module for module, names in _PUBLIC.items() for name in names}

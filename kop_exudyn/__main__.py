@@ -1,4 +1,5 @@
 """``python -m kop_exudyn``: the same as the command ``kop``."""
+
 import sys
 
 from .cli import main

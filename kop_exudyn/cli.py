@@ -1,13 +1,16 @@
-"""The command ``kop``: parses arguments, and turns what can go wrong into one line and an exit status."""
+"""The command ``kop``: parses arguments, and turns what can go wrong into one line and an exit
+status."""
+
 from __future__ import annotations
 
 import argparse
 import logging
 import os
 import sys
+from collections.abc import Sequence
 from importlib import import_module
 from keyword import iskeyword
-from typing import NoReturn, Sequence
+from typing import NoReturn
 
 from . import __version__
 from .commands import NAMES
@@ -16,7 +19,9 @@ from .errors import InputError, SimulationFailure
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
-_DESCRIPTION = "Kits of parts for bending-active structures: one small set of pieces that builds many designs."
+_DESCRIPTION = (
+    "Kits of parts for bending-active structures: one small set of pieces that builds many designs."
+)
 _STATUS = """exit status:
   0    success
   1    a simulation failed, or a design can't be built from the kit
@@ -29,7 +34,8 @@ _EPILOG = f"""examples:
 
 {_STATUS}
 
-All commands take --json, --quiet and --verbose. Messages are coloured on terminals, unless NO_COLOR is set."""
+All commands take --json, --quiet and --verbose. Messages are coloured on terminals, unless NO_COLOR
+is set."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -63,23 +69,42 @@ def make_parser() -> argparse.ArgumentParser:
     verbosity = _Parser(add_help=False)
     group = verbosity.add_mutually_exclusive_group()
     group.add_argument("-q", "--quiet", action="store_true", help="no progress, errors only")
-    group.add_argument("-v", "--verbose", action="count", default=0, help="say what is being done; twice: every detail")
-    parser = _Parser(prog="kop", description=_DESCRIPTION, epilog=_EPILOG,
-                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    group.add_argument(
+        "-v",
+        "--verbose",
+        action="count",
+        default=0,
+        help="say what is being done; twice: every detail",
+    )
+    parser = _Parser(
+        prog="kop",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument("--version", action="version", version=f"kop_exudyn {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in NAMES:
         command = import_module(f".commands.{name}{'_' if iskeyword(name) else ''}", __package__)
         subparser = commands.add_parser(
-            name, parents=[verbosity], help=command.HELP, description=command.DESCRIPTION,
-            epilog=f"{command.EXAMPLES}\n\n{_STATUS}", formatter_class=argparse.RawDescriptionHelpFormatter)
+            name,
+            parents=[verbosity],
+            help=command.HELP,
+            description=command.DESCRIPTION,
+            epilog=f"{command.EXAMPLES}\n\n{_STATUS}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
         command.arguments(subparser)
         subparser.set_defaults(run=command.run, parser=parser)
     return parser
 
 
 def _set_up_logging(args: argparse.Namespace) -> None:
-    level = logging.ERROR if args.quiet else [logging.WARNING, logging.INFO, logging.DEBUG][min(args.verbose, 2)]
+    level = (
+        logging.ERROR
+        if args.quiet
+        else [logging.WARNING, logging.INFO, logging.DEBUG][min(args.verbose, 2)]
+    )
     logger = logging.getLogger(__package__)
     logger.setLevel(level)
     handler = logging.StreamHandler()

@@ -1,4 +1,6 @@
-"""The two ways in which a request can go wrong: bad input, and a simulation that finds no equilibrium."""
+"""The two ways in which a request can go wrong: bad input, and a simulation that finds no
+equilibrium."""
+
 from __future__ import annotations
 
 from typing import Any
@@ -15,7 +17,9 @@ class InputError(ValueError):
     value : the offending value
     """
 
-    def __init__(self, message: str, *, source: Any = None, field: str | None = None, value: Any = None):
+    def __init__(
+        self, message: str, *, source: Any = None, field: str | None = None, value: Any = None
+    ):
         self.message, self.source, self.field, self.value = message, source, field, value
         super().__init__(str(self))
 
@@ -28,7 +32,9 @@ class InputError(ValueError):
 
     def at(self, source: Any) -> InputError:
         """The same error, with the file that it came from filled in where it was unknown."""
-        return InputError(self.message, source=self.source or source, field=self.field, value=self.value)
+        return InputError(
+            self.message, source=self.source or source, field=self.field, value=self.value
+        )
 
     def __reduce__(self):
         return _rebuild_input_error, (self.message, self.source, self.field, self.value)
@@ -53,7 +59,9 @@ class SimulationFailure(RuntimeError):
 
     def within(self, where: str) -> SimulationFailure:
         """The same failure, named by the wider context that it happened in."""
-        return SimulationFailure(self.reason, where=where if self.where is None else f"{where}: {self.where}")
+        return SimulationFailure(
+            self.reason, where=where if self.where is None else f"{where}: {self.where}"
+        )
 
     def __reduce__(self):
         return _rebuild_failure, (self.reason, self.where)

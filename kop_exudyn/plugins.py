@@ -1,4 +1,6 @@
-"""Folders whose every module registers something: a structure class, a kind of parts, a term of the objective."""
+"""Folders whose every module registers something: a structure class, a kind of parts, a term of the
+objective."""
+
 from __future__ import annotations
 
 import pkgutil

@@ -2,12 +2,14 @@
 
     python studies/benchmark.py [--quick] [--out reports/benchmark] [--released FOLDER]
 
-How long equilibria, sensitivities and optimisation steps take, for a given error: a cantilever under its weight, a
-grid, a C-shell and umbrella meshes with 1 to 8 rod elements a piece, gridshells of 500 to 100,000 unknowns, and SQP
-steps with the exact Hessian and with BFGS. Errors are the largest distance of a joint from the same design with 12
-elements a piece (the cantilever: 64), in % of the bounding box. Times are processor times after compilation, medians
-of several runs with bars from the least to the most; all runs in one thread, so on an idle machine they are wall times.
+How long equilibria, sensitivities and optimisation steps take, for a given error: a cantilever
+under its weight, a grid, a C-shell and umbrella meshes with 1 to 8 rod elements a piece, gridshells
+of 500 to 100,000 unknowns, and SQP steps with the exact Hessian and with BFGS. Errors are the
+largest distance of a joint from the same design with 12 elements a piece (the cantilever: 64), in %
+of the bounding box. Times are processor times after compilation, medians of several runs with bars
+from the least to the most; all runs in one thread, so on an idle machine they are wall times.
 """
+
 from __future__ import annotations
 
 import argparse
@@ -16,25 +18,27 @@ from pathlib import Path
 
 import numpy as np
 
-from kop_exudyn.analysis import benchmark_goals as goals
-from kop_exudyn.analysis.benchmark import deployments, fresh, speedups, three_ways
-from kop_exudyn.analysis.benchmark_scaling import PHASES, scaling
-from kop_exudyn.analysis.benchmark_scenes import cantilever, gridshell
-from kop_exudyn.analysis.benchmark_steps import sqp_steps
 from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.equilibrium.system import System
 from kop_exudyn.equilibrium.warm_up import warm_up
+from kop_exudyn.files.json_files import read_json
 from kop_exudyn.io.designs import load_design
-from kop_exudyn.io.json_files import read_json
-from kop_exudyn.report.benchmark_figures import error_against_time, scaling_figure, steps_figure, ways_compared
-from kop_exudyn.report.study import Study
+from lib import benchmark_goals as goals
+from lib.benchmark import deployments, fresh, speedups, three_ways
+from lib.benchmark_figures import error_against_time, scaling_figure, steps_figure, ways_compared
+from lib.benchmark_scaling import PHASES, scaling
+from lib.benchmark_scenes import cantilever, gridshell
+from lib.benchmark_steps import sqp_steps
+from lib.study import Study
 
 ROOT = Path(__file__).resolve().parents[1]
 MODELS = ROOT / "models"
-CASES = {"C-shell": ("conformals/03_exp.json", "elements_per_piece"),
-         "grid": ("grids/05_free_form.json", "elements_per_piece"),
-         "umbrella hill": ("umbrellas/hill.json", "arm_elements"),
-         "umbrella saddle": ("umbrellas/saddle.json", "arm_elements")}
+CASES = {
+    "C-shell": ("conformals/03_exp.json", "elements_per_piece"),
+    "grid": ("grids/05_free_form.json", "elements_per_piece"),
+    "umbrella hill": ("umbrellas/hill.json", "arm_elements"),
+    "umbrella saddle": ("umbrellas/saddle.json", "arm_elements"),
+}
 FINE, FINE_STRIP, CHANGE = 12, 64, 1e-6
 
 
@@ -48,20 +52,58 @@ def main() -> None:
     refinements, runs = ((1, 2), 1) if quick else ((1, 2, 3, 4, 6, 8), 3)
 
     # 1. Full deployments.
-    cases = {"C-shell": ("small/03_exp.json", "elements_per_piece"), "grid": CASES["grid"]} if quick else CASES
-    rows = [row for case, (file, field) in cases.items() for row in deployments(
-        case, lambda n, f=file, k=field: fresh(read_json(MODELS / f), {k: n}), refinements, 4 if quick else FINE, runs)]
+    cases = (
+        {"C-shell": ("small/03_exp.json", "elements_per_piece"), "grid": CASES["grid"]}
+        if quick
+        else CASES
+    )
+    rows = [
+        row
+        for case, (file, field) in cases.items()
+        for row in deployments(
+            case,
+            lambda n, f=file, k=field: fresh(read_json(MODELS / f), {k: n}),
+            refinements,
+            4 if quick else FINE,
+            runs,
+        )
+    ]
 
-    # 2. One solve three ways: from a straight strip, from a design surface, and from a neighbouring equilibrium.
-    ways = three_ways("cantilever", lambda n: (*cantilever(n), None), lambda n: [n], refinements, FINE_STRIP, 1.0, runs)
-    ways += three_ways("grid", grid_from_its_surface, lambda n: grid(n).joints, refinements, 4 if quick else FINE,
-                       grid(1).target.diagonal, runs)
-    ways += three_ways("gridshell, warm", warm_gridshell, lambda n: np.arange(64), refinements, 4 if quick else FINE,
-                       float(np.sqrt(2.04)), runs)
+    # 2. One solve three ways: from a straight strip, from a design surface, and from a neighbouring
+    # equilibrium.
+    ways = three_ways(
+        "cantilever",
+        lambda n: (*cantilever(n), None),
+        lambda n: [n],
+        refinements,
+        FINE_STRIP,
+        1.0,
+        runs,
+    )
+    ways += three_ways(
+        "grid",
+        grid_from_its_surface,
+        lambda n: grid(n).joints,
+        refinements,
+        4 if quick else FINE,
+        grid(1).target.diagonal,
+        runs,
+    )
+    ways += three_ways(
+        "gridshell, warm",
+        warm_gridshell,
+        lambda n: np.arange(64),
+        refinements,
+        4 if quick else FINE,
+        float(np.sqrt(2.04)),
+        runs,
+    )
 
     # 3. Size, and 4. optimisation.
     sizes = scaling((4, 7) if quick else (5, 8, 12, 17, 24, 34, 45, 59), runs)
-    designs = [load_design(path) for path in sorted((MODELS / "small").glob("*.json"))[: 1 if quick else 3]]
+    designs = [
+        load_design(path) for path in sorted((MODELS / "small").glob("*.json"))[: 1 if quick else 3]
+    ]
     steps = sqp_steps(designs, 2 if quick else 15)
 
     # 5. What was promised.
@@ -69,23 +111,46 @@ def main() -> None:
     table = promised(runs, released.released, sizes[-1], faster, quick)
     met = [row for row in table if row["met"] == "yes"]
     report = study.report(f"{len(met)} of {len(table)} goals are met.")
-    report.section("Goals", "Notes on missed goals say what the time goes into.").table("goals", table)
+    report.section("Goals", "Notes on missed goals say what the time goes into.").table(
+        "goals", table
+    )
     report.section("Full deployments").figure(
-        "deployments", error_against_time(rows), "Points are numbered by rod elements a piece; bars go from the least "
-        "to the most time.", alt="error over time of full deployments").table("deployments", rows)
-    report.section("The same solve three ways", "The warm gridshell starts from an equilibrium before random changes "
-                   f"of its lengths by {CHANGE:g}. All stop at 1e-9 of the largest force, or don't converge.").figure(
-        "ways", ways_compared(ways), "Exudyn's elements are the same, so that its solutions have the same errors.",
-        alt="error over time for three solvers").table("ways", ways).table("faster", faster, "Where both converge")
+        "deployments",
+        error_against_time(rows),
+        "Points are numbered by rod elements a piece; bars go from the least to the most time.",
+        alt="error over time of full deployments",
+    ).table("deployments", rows)
+    report.section(
+        "The same solve three ways",
+        "The warm gridshell starts from an equilibrium before random changes "
+        f"of its lengths by {CHANGE:g}. All stop at 1e-9 of the largest force, or don't converge.",
+    ).figure(
+        "ways",
+        ways_compared(ways),
+        "Exudyn's elements are the same, so that its solutions have the same errors.",
+        alt="error over time for three solvers",
+    ).table("ways", ways).table("faster", faster, "Where both converge")
     report.section("Size").figure(
-        "scaling", scaling_figure(sizes, PHASES), "Gridshells with three elements a piece, from their unstressed state "
-        "with all lengths shortened by 0.1 %. Every size ran in a process of its own.", alt="time and memory by size")
-    report.table("scaling", sizes, "Seconds; assembly, factorisation and rest add up to a whole solve")
-    report.section("Optimisation").figure("steps", steps_figure(steps), "Relaxed stage of small C-shells from inputs.",
-                                          alt="objective by SQP steps")
+        "scaling",
+        scaling_figure(sizes, PHASES),
+        "Gridshells with three elements a piece, from their unstressed state "
+        "with all lengths shortened by 0.1 %. Every size ran in a process of its own.",
+        alt="time and memory by size",
+    )
+    report.table(
+        "scaling", sizes, "Seconds; assembly, factorisation and rest add up to a whole solve"
+    )
+    report.section("Optimisation").figure(
+        "steps",
+        steps_figure(steps),
+        "Relaxed stage of small C-shells from inputs.",
+        alt="objective by SQP steps",
+    )
     report.table("steps", [{k: v for k, v in row.items() if k != "values"} for row in steps])
-    report.save({"deployments": rows, "ways": ways, "scaling": sizes, "steps": steps, "goals": table},
-                {"refinements": refinements, "runs": runs, "fine": FINE, "change": CHANGE})
+    report.save(
+        {"deployments": rows, "ways": ways, "scaling": sizes, "steps": steps, "goals": table},
+        {"refinements": refinements, "runs": runs, "fine": FINE, "change": CHANGE},
+    )
 
 
 def grid(n: int):
@@ -106,20 +171,38 @@ def warm_gridshell(n: int):
 def promised(runs: int, released: Path, largest: dict, faster: list, quick: bool) -> list:
     """The table of goals; the quick one has those that take a moment only."""
     shell = load_design(MODELS / ("small" if quick else "conformals") / "03_exp.json")
-    table = [*goals.newton_iteration(runs, 5 if quick else 17), goals.full_sensitivities(shell, runs),
-             goals.goal("memory of the largest gridshell", 2048, "MiB", largest["peak MiB"],
-                        f"{largest['unknowns']} unknowns")]
+    table = [
+        *goals.newton_iteration(runs, 5 if quick else 17),
+        goals.full_sensitivities(shell, runs),
+        goals.goal(
+            "memory of the largest gridshell",
+            2048,
+            "MiB",
+            largest["peak MiB"],
+            f"{largest['unknowns']} unknowns",
+        ),
+    ]
     frames = [row["times as fast as Exudyn"] for row in faster if row["case"] != "cantilever"]
     if frames:
-        table.append(goals.goal("ahead of Exudyn's own solver, structures", 20, "times", min(frames),
-                                at_least=True, note=f"least of {len(frames)}; the cantilever is no structure"))
+        table.append(
+            goals.goal(
+                "ahead of Exudyn's own solver, structures",
+                20,
+                "times",
+                min(frames),
+                at_least=True,
+                note=f"least of {len(frames)}; the cantilever is no structure",
+            )
+        )
     if not quick:
         table.append(goals.large_c_shell(read_json(MODELS / "conformals" / "01_sinh.json"), runs))
         table += goals.starting(MODELS / "small" / "03_exp.json", runs)
         five = [load_design(path) for path in sorted((MODELS / "conformals").glob("*.json"))[:5]]
         table.append(goals.kit_problem(five, {"linear": 12, "angular": 5}, 180.0))
         if released.is_dir():
-            table += goals.released({n: load_design(released / f"{n}.json.gz") for n in goals.RELEASED}, runs)
+            table += goals.released(
+                {n: load_design(released / f"{n}.json.gz") for n in goals.RELEASED}, runs
+            )
         else:
             print(f"{released} is not there: goals of released meshes left out", file=sys.stderr)
     return table

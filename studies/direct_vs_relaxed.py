@@ -2,22 +2,24 @@
 
     python studies/direct_vs_relaxed.py [--quick] [--out reports/direct_vs_relaxed] [--jobs 2]
 
-A kit can be had at once: cluster the elements of all input designs, and replace each element by its nearest part
-(direct). The parts can then be tuned (unrelaxed). The method instead lets all elements move before they become parts
-(relaxed), and tunes the parts and their assignment at the end (assigned). All four are computed for kits of three
-classes of structures, and every state shown is an equilibrium that Exudyn confirmed. Deviations are distances of the
-joints from the target surface in % of its bounding-box diagonal.
+A kit can be had at once: cluster the elements of all input designs, and replace each element by its
+nearest part (direct). The parts can then be tuned (unrelaxed). The method instead lets all elements
+move before they become parts (relaxed), and tunes the parts and their assignment at the end
+(assigned). All four are computed for kits of three classes of structures, and every state shown is
+an equilibrium that Exudyn confirmed. Deviations are distances of the joints from the target surface
+in % of its bounding-box diagonal.
 """
+
 from __future__ import annotations
 
 from pathlib import Path
 
-from kop_exudyn.analysis.kit_result import STAGES
-from kop_exudyn.report.comparison import comparison_rows, draw_comparison, finding
 from kop_exudyn.report.designs import DrawnDesign, draw_designs
 from kop_exudyn.report.kit_drawings import drawn_stages
-from kop_exudyn.report.study import Study
-from kop_exudyn.report.study_kits import kits
+from kop_exudyn.search.result import STAGES
+from lib.comparison import comparison_rows, draw_comparison, finding
+from lib.study import Study
+from lib.study_kits import kits
 
 ROOT = Path(__file__).resolve().parents[1]
 SHOWN = 3  # designs of each class in the pictures: those that gain most
@@ -33,31 +35,52 @@ def main() -> None:
     rows = [row for name, result in results.items() for row in comparison_rows(name, result)]
     outcome = finding(rows)
     report = study.report(outcome)
-    report.figure("deviations", draw_comparison(rows),
-                  "Largest deviation of every design after each stage, logarithmic. A cross at the right: no "
-                  "equilibrium was found, or Exudyn didn't confirm it. A ring: it buckled into another "
-                  "state: led back to the elements of the input, it doesn't come back to the input's shape.",
-                  alt="Deviation of all designs after the four stages")
-    report.table("designs", [{key: row[key] for key in row if not key.endswith("energy")} for row in rows],
-                 "Deviations of the joints in % of the bounding-box diagonal. Failed: no equilibrium was found.")
-    report.table("energies", [{key: row[key] for key in row if key in ("class", "design") or key.endswith("energy")}
-                              for row in rows], "Elastic energy of the deployed state, relative to the input's.")
+    report.figure(
+        "deviations",
+        draw_comparison(rows),
+        "Largest deviation of every design after each stage, logarithmic. A cross at the right: no "
+        "equilibrium was found, or Exudyn didn't confirm it. A ring: it buckled into another "
+        "state: led back to the elements of the input, it doesn't come back to the input's shape.",
+        alt="Deviation of all designs after the four stages",
+    )
+    report.table(
+        "designs",
+        [{key: row[key] for key in row if not key.endswith("energy")} for row in rows],
+        "Deviations of the joints in % of the bounding-box diagonal. Failed: no equilibrium was "
+        "found.",
+    )
+    report.table(
+        "energies",
+        [
+            {key: row[key] for key in row if key in ("class", "design") or key.endswith("energy")}
+            for row in rows
+        ],
+        "Elastic energy of the deployed state, relative to the input's.",
+    )
 
     # 3. The designs themselves, class by class.
     for name, result in results.items():
         sizes = " and ".join(f"{count} {kind}" for kind, count in result.kit.sizes.items())
         elements = sum(design.n_elements for design in result.designs)
-        report.section(name, f"{sizes} parts realise {elements} elements of {len(result.designs)} designs.")
-        report.figure(name.replace(" ", "_"), draw_designs(most_changed(drawn_stages(result, STAGES))),
-                      "Equilibria at their best placement on the target; grey: the input design. Joints are coloured "
-                      f"by their deviation. Of {len(result.designs)} designs those that direct projection leaves "
-                      "farthest off are shown.",
-                      alt=f"The {name} after direct projection, unrelaxed, relaxed and assigned")
+        report.section(
+            name, f"{sizes} parts realise {elements} elements of {len(result.designs)} designs."
+        )
+        report.figure(
+            name.replace(" ", "_"),
+            draw_designs(most_changed(drawn_stages(result, STAGES))),
+            "Equilibria at their best placement on the target; grey: the input design. Joints are "
+            "coloured "
+            f"by their deviation. Of {len(result.designs)} designs those that direct projection "
+            f"leaves "
+            "farthest off are shown.",
+            alt=f"The {name} after direct projection, unrelaxed, relaxed and assigned",
+        )
     report.save({"finding": outcome, "designs": rows})
 
 
 def most_changed(designs: list[DrawnDesign]) -> list[DrawnDesign]:
     """The designs with the largest deviations after direct projection; failures first."""
+
     def deviation(design: DrawnDesign) -> float:
         state = design.states[0]
         return float("inf") if state.failed is not None else max(state.deviation_percent)

@@ -2,13 +2,16 @@
 
     python studies/part_reuse.py [--quick] [--out DIR] [--jobs N] [--scheduler ADDRESS] [--resume]
 
-The kits of the study of kit sizes (conformals 1 to 5, 5 angular and 2 to 25 linear parts) are looked at again: which
-design uses which part how often, and how much of its pieces any set of designs shares.
+The kits of the study of kit sizes (conformals 1 to 5, 5 angular and 2 to 25 linear parts) are
+looked at again: which design uses which part how often, and how much of its pieces any set of
+designs shares.
 
-The reuse of a set of designs is the number of pieces that all of them use over the number that any of them uses; for
-two designs that is the Jaccard index of their multisets of pieces. The average is over all sets of two or more
-designs. Kits that the other study left in its folder are taken from there, missing ones are computed.
+The reuse of a set of designs is the number of pieces that all of them use over the number that any
+of them uses; for two designs that is the Jaccard index of their multisets of pieces. The average is
+over all sets of two or more designs. Kits that the other study left in its folder are taken from
+there, missing ones are computed.
 """
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -16,9 +19,9 @@ from pathlib import Path
 import numpy as np
 
 from kop_exudyn.analysis.reuse import counts_of, jaccard_matrix, part_users, reuse_figures
-from kop_exudyn.report.reuse_drawing import draw_reuse_over_size, draw_sharing, draw_subsets
-from kop_exudyn.report.study import Study
-from kop_exudyn.report.study_tasks import shared_kits
+from lib.reuse_drawing import draw_reuse_over_size, draw_sharing, draw_subsets
+from lib.study import Study
+from lib.study_tasks import shared_kits
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
 SHOWN = 12  # linear parts of the kit that is shown in detail
@@ -29,45 +32,97 @@ def main() -> None:
 
     # 1. The kits, from the folder of the other study where it was run.
     _, best = shared_kits(study, MODELS, [study.out.parent / "kit_size_tradeoff" / "sweep"])
-    kits = {size: study.results[task.name].value for size, task in best.items()
-            if study.results[task.name].failed is None}
+    kits = {
+        size: study.results[task.name].value
+        for size, task in best.items()
+        if study.results[task.name].failed is None
+    }
 
     # 2. The figures of each, and the details of one.
     found = {size: reuse_figures(kit["pieces"]) for size, kit in kits.items()}
-    rows = [{"linear": size, "pieces": f["pieces"], "kit size %": f["kit_size_percent"],
-             "average reuse": f["average_reuse"], "linear reuse": f["by_kind"]["linear"],
-             "angular reuse": f["by_kind"]["angular"], "parts of one design": f["parts_of_one_design"],
-             "sets that share nothing": len(f["groups"])} for size, f in found.items()]
+    rows = [
+        {
+            "linear": size,
+            "pieces": f["pieces"],
+            "kit size %": f["kit_size_percent"],
+            "average reuse": f["average_reuse"],
+            "linear reuse": f["by_kind"]["linear"],
+            "angular reuse": f["by_kind"]["angular"],
+            "parts of one design": f["parts_of_one_design"],
+            "sets that share nothing": len(f["groups"]),
+        }
+        for size, f in found.items()
+    ]
     size = min(kits, key=lambda s: abs(s - SHOWN))
     kit, detail = kits[size], found[size]
     names = [design["name"] for design in kit["designs"]]
-    labels = [f"{kind[0].upper()}{k + 1}" for kind in sorted(kit["pieces"][0]) for k in range(len(kit["kit"][kind]))]
+    labels = [
+        f"{kind[0].upper()}{k + 1}"
+        for kind in sorted(kit["pieces"][0])
+        for k in range(len(kit["kit"][kind]))
+    ]
     counts = counts_of(kit["pieces"])
-    pairs = [(detail["jaccard"][i][j], names[i], names[j]) for i in range(len(names)) for j in range(i)]
+    pairs = [
+        (detail["jaccard"][i][j], names[i], names[j]) for i in range(len(names)) for j in range(i)
+    ]
     most, least = max(pairs), min(pairs)
     shared = int(np.count_nonzero(part_users(counts) == len(names)))
-    finding = (f"Of the {len(labels)} parts of the kit with {size} linear ones, {shared} are used by all {len(names)} "
-               f"designs; {most[1]} and {most[2]} share most ({most[0]:.0%} of their pieces), {least[1]} and "
-               f"{least[2]} least ({least[0]:.0%}). From {rows[0]['linear']} to {rows[-1]['linear']} linear parts the "
-               f"average reuse goes from {rows[0]['average reuse']:.2f} to {rows[-1]['average reuse']:.2f}.")
+    finding = (
+        f"Of the {len(labels)} parts of the kit with {size} linear ones, {shared} are used by all "
+        f"{len(names)} "
+        f"designs; {most[1]} and {most[2]} share most ({most[0]:.0%} of their pieces), {least[1]} "
+        f"and "
+        f"{least[2]} least ({least[0]:.0%}). From {rows[0]['linear']} to {rows[-1]['linear']} "
+        f"linear parts the "
+        f"average reuse goes from {rows[0]['average reuse']:.2f} to "
+        f"{rows[-1]['average reuse']:.2f}."
+    )
 
     # 3. The report.
     report = study.report(finding)
-    report.figure("sharing", draw_sharing(names, counts, labels, jaccard_matrix(counts)),
-                  f"The kit with {size} linear parts (L) and its angular ones (A). Left: how many pieces of each part "
-                  "a design is built of. Right: share of the pieces that two designs have in common.",
-                  alt="Pieces of each part by design, and the Jaccard index of each pair")
-    report.figure("subsets", draw_subsets(detail["subsets"], names), "Every set of two or more designs.",
-                  alt="Reuse of all sets of designs, by their size")
+    report.figure(
+        "sharing",
+        draw_sharing(names, counts, labels, jaccard_matrix(counts)),
+        f"The kit with {size} linear parts (L) and its angular ones (A). Left: how many pieces of "
+        f"each part "
+        "a design is built of. Right: share of the pieces that two designs have in common.",
+        alt="Pieces of each part by design, and the Jaccard index of each pair",
+    )
+    report.figure(
+        "subsets",
+        draw_subsets(detail["subsets"], names),
+        "Every set of two or more designs.",
+        alt="Reuse of all sets of designs, by their size",
+    )
     groups = "; ".join(", ".join(names[k] for k in group) for group in detail["groups"])
-    report.text(f"Sets of designs that share no part: {groups}." if len(detail["groups"]) > 1 else
-                "All designs are connected by common parts: no set of them has a kit of its own.")
-    report.section("Against the size of the kit", "The same figures for every number of linear parts.")
-    report.figure("sizes", draw_reuse_over_size(rows, "linear"), "Every kit of the study of sizes.",
-                  alt="Average reuse and kit size over linear parts")
-    report.table("kits", rows, "Pieces: as many of each part as the design that needs most; parts of one design: that "
-                 "no other one uses; sets that share nothing: 1 means that all designs are connected.")
-    report.save({"finding": finding, "kits": rows, "details": {str(s): f for s, f in found.items()}, "designs": names})
+    report.text(
+        f"Sets of designs that share no part: {groups}."
+        if len(detail["groups"]) > 1
+        else "All designs are connected by common parts: no set of them has a kit of its own."
+    )
+    report.section(
+        "Against the size of the kit", "The same figures for every number of linear parts."
+    )
+    report.figure(
+        "sizes",
+        draw_reuse_over_size(rows, "linear"),
+        "Every kit of the study of sizes.",
+        alt="Average reuse and kit size over linear parts",
+    )
+    report.table(
+        "kits",
+        rows,
+        "Pieces: as many of each part as the design that needs most; parts of one design: that "
+        "no other one uses; sets that share nothing: 1 means that all designs are connected.",
+    )
+    report.save(
+        {
+            "finding": finding,
+            "kits": rows,
+            "details": {str(s): f for s, f in found.items()},
+            "designs": names,
+        }
+    )
 
 
 if __name__ == "__main__":

@@ -1,29 +1,33 @@
 """A new design on a kit that exists: a sixth C-shell built of the parts of five others.
 
-    python studies/project_new_design.py [--quick] [--out DIR] [--jobs N] [--scheduler ADDRESS] [--resume]
+    python studies/project_new_design.py [--quick] [--out DIR] [--jobs N] [--scheduler ADDRESS]
+    [--resume]
 
-The kit of the study of kit sizes with 12 linear and 5 angular parts was made for conformals 1 to 5. Here conformal 6,
-which it has never seen, is built of the same parts, once for each of several weights w_c of the projection energy.
+The kit of the study of kit sizes with 12 linear and 5 angular parts was made for conformals 1 to 5.
+Here conformal 6, which it has never seen, is built of the same parts, once for each of several
+weights w_c of the projection energy.
 
-Direct: every input element becomes its nearest part. Relaxed: all elements move, drawn to their nearest parts by w_c
-and held by the target. Built: each relaxed element becomes its nearest part. Exchanged: elements then get other parts
-where the objective gains by that. An element is changed when its part, or the way in which that is built in, isn't
-the one of the direct projection. Deviations are distances of the joints from the target surface; every state is
-confirmed by Exudyn.
+Direct: every input element becomes its nearest part. Relaxed: all elements move, drawn to their
+nearest parts by w_c and held by the target. Built: each relaxed element becomes its nearest part.
+Exchanged: elements then get other parts where the objective gains by that. An element is changed
+when its part, or the way in which that is built in, isn't the one of the direct projection.
+Deviations are distances of the joints from the target surface; every state is confirmed by Exudyn.
 """
+
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Mapping
+from typing import Any
 
 import numpy as np
 
-from kop_exudyn.analysis.sweep import Task
 from kop_exudyn.io.designs import load_design
-from kop_exudyn.optimize.stage_settings import StageSettings
-from kop_exudyn.report.projection_drawing import draw_changes, draw_projection
-from kop_exudyn.report.study import Study
-from kop_exudyn.report.study_tasks import QUICK, changed, project_task, shared_kits
+from kop_exudyn.search.settings import StageSettings
+from lib.projection_drawing import draw_changes, draw_projection
+from lib.study import Study
+from lib.study_tasks import QUICK, changed, project_task, shared_kits
+from lib.sweep import Task
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
 STATES = ("direct", "relaxed", "built", "reassigned")
@@ -32,14 +36,28 @@ STATES = ("direct", "relaxed", "built", "reassigned")
 def main() -> None:
     study = Study.from_command_line(__doc__, __file__)
 
-    # 1. The kit, from the folder of the other study where that was run, and then one projection a weight.
-    file = MODELS / "small" / "06_moebius.json" if study.quick else MODELS / "conformals" / "06_moebius.json"
-    size, factors = (3, (0.1, 10.0)) if study.quick else (12, tuple(10.0 ** (k / 2) for k in range(-4, 7)))
+    # 1. The kit, from the folder of the other study where that was run, and then one projection a
+    # weight.
+    file = (
+        MODELS / "small" / "06_moebius.json"
+        if study.quick
+        else MODELS / "conformals" / "06_moebius.json"
+    )
+    size, factors = (
+        (3, (0.1, 10.0)) if study.quick else (12, tuple(10.0 ** (k / 2) for k in range(-4, 7)))
+    )
     stages = changed(QUICK if study.quick else StageSettings())
     other = study.out.parent / "kit_size_tradeoff" / "sweep"
     kits, best = shared_kits(study, MODELS, [other])
-    tasks = [Task(f"w_c {factor:.3g}", project_task, {"file": file, "factor": factor, "stages": stages},
-                  after=best[size].name) for factor in factors]
+    tasks = [
+        Task(
+            f"w_c {factor:.3g}",
+            project_task,
+            {"file": file, "factor": factor, "stages": stages},
+            after=best[size].name,
+        )
+        for factor in factors
+    ]
     found = study.sweep(kits + tasks, also=[other])
 
     # 2. One row a weight; the best one.
@@ -50,27 +68,53 @@ def main() -> None:
     finding = f"{design.name} can't be built of the kit."
     if built:
         best = min(built, key=lambda row: row["reassigned J"])
-        finding = (f"{design.name} deviates by {shown(direct)} when its elements become their nearest parts, by "
-                   f"{shown(best['built max %'])} when they are relaxed before (w_c = {best['w_c']:.3g} times the "
-                   f"weight of the fit), and by {shown(best['reassigned max %'])} after exchanges; "
-                   f"{best['reassigned changes']} of its {design.n_elements} elements then have other parts than "
-                   "in the direct projection.")
+        finding = (
+            f"{design.name} deviates by {shown(direct)} when its elements become their nearest "
+            f"parts, by "
+            f"{shown(best['built max %'])} when they are relaxed before (w_c = {best['w_c']:.3g} "
+            f"times the "
+            f"weight of the fit), and by {shown(best['reassigned max %'])} after exchanges; "
+            f"{best['reassigned changes']} of its {design.n_elements} elements then have other "
+            f"parts than "
+            "in the direct projection."
+        )
 
     # 3. The report.
     report = study.report(finding)
-    report.figure("sweep", draw_projection(rows), "The new design against w_c. Dotted: direct projection.",
-                  alt="Deviation, energy, distance to the parts and changed elements over w_c")
+    report.figure(
+        "sweep",
+        draw_projection(rows),
+        "The new design against w_c. Dotted: direct projection.",
+        alt="Deviation, energy, distance to the parts and changed elements over w_c",
+    )
     drawn = [tasks[k] for k in np.unique(np.linspace(0, len(tasks) - 1, 6).round().astype(int))]
-    states = [(f"w_c = {task.settings['factor']:g}", found[task.name]["reassigned"]) for task in drawn
-              if "failed" not in found[task.name]]
-    report.figure("changes", draw_changes(design, states), "The design built of the kit, after exchanges: elements "
-                  "with other parts than after direct projection.",
-                  alt="The design for several w_c, changed elements in colour")
+    states = [
+        (f"w_c = {task.settings['factor']:g}", found[task.name]["reassigned"])
+        for task in drawn
+        if "failed" not in found[task.name]
+    ]
+    report.figure(
+        "changes",
+        draw_changes(design, states),
+        "The design built of the kit, after exchanges: elements "
+        "with other parts than after direct projection.",
+        alt="The design for several w_c, changed elements in colour",
+    )
     columns = [f"{state} {what}" for state in STATES[1:] for what in ("max %", "J", "changes")]
-    report.table("weights", [{"w_c": row["w_c"], **{name.replace("reassigned", "exchanged"): row[name]
-                                                    for name in columns}} for row in rows],
-                 f"w_c over the weight of the fit; max %: largest deviation, {shown(direct)} after direct projection; "
-                 "J: the objective; changes: elements with other parts than then. A dash: no equilibrium was found.")
+    report.table(
+        "weights",
+        [
+            {
+                "w_c": row["w_c"],
+                **{name.replace("reassigned", "exchanged"): row[name] for name in columns},
+            }
+            for row in rows
+        ],
+        f"w_c over the weight of the fit; max %: largest deviation, {shown(direct)} after direct "
+        f"projection; "
+        "J: the objective; changes: elements with other parts than then. A dash: no equilibrium "
+        "was found.",
+    )
     report.save({"finding": finding, "weights": rows, "design": design.name})
 
 
@@ -79,8 +123,11 @@ def row_of(factor: float, found: Mapping[str, Any]) -> dict[str, Any]:
     row: dict[str, Any] = {"w_c": factor}
     for state in STATES:
         one = found.get(state, {})
-        row |= {f"{state} max %": one.get("fit", {}).get("max_percent"), f"{state} J": one.get("objective"),
-                f"{state} energy ratio": one.get("energy_ratio")}
+        row |= {
+            f"{state} max %": one.get("fit", {}).get("max_percent"),
+            f"{state} J": one.get("objective"),
+            f"{state} energy ratio": one.get("energy_ratio"),
+        }
         row |= {f"{state} changes": one.get("changes")} if state != "direct" else {}
     tightness = found.get("relaxed", {}).get("tightness", {})
     return row | {f"{kind} distance %": 100 * value for kind, value in tightness.items()}

@@ -2,27 +2,30 @@
 
     python studies/two_stage.py [--quick] [--out reports/two_stage]
 
-Writes the same folder as `kop optimize models/conformals --designs 3 --parts linear=12,angular=5`, and the picture that
-the README shows.
+Writes the same folder as `kop optimize models/conformals --designs 3 --parts linear=12,angular=5`,
+and the picture that the README shows.
 """
+
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from kop_exudyn.io.designs import load_designs, select_files
-from kop_exudyn.io.files import write_bytes
-from kop_exudyn.optimize.job import JobSettings
-from kop_exudyn.optimize.stage_settings import StageSettings
+from kop_exudyn.drawing.style import with_palette
+from kop_exudyn.files.files import write_bytes
+from kop_exudyn.io.datasets import load_designs, select_files
 from kop_exudyn.report.environment import usable_cores
 from kop_exudyn.report.kit_run import optimize_kit
-from kop_exudyn.report.style import with_palette
+from kop_exudyn.search.job import JobSettings
+from kop_exudyn.search.settings import StageSettings
 
 ROOT = Path(__file__).resolve().parents[1]
 MODELS = ROOT / "models" / "conformals"
 
 parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-parser.add_argument("--quick", action="store_true", help="one design and few steps, to see that it works")
+parser.add_argument(
+    "--quick", action="store_true", help="one design and few steps, to see that it works"
+)
 parser.add_argument("--out", type=Path, default=ROOT / "reports" / "two_stage")
 parser.add_argument("--jobs", type=int, default=usable_cores())
 parser.add_argument("--resume", action="store_true")
@@ -34,16 +37,33 @@ designs = load_designs(MODELS, number)
 
 # 2. How many parts of each kind, and how long to optimise.
 parts = {"linear": 6, "angular": 3} if arguments.quick else {"linear": 12, "angular": 5}
-stages = StageSettings(relaxed_steps=2, assigned_steps=2, reassignments=0, path_steps=4) if arguments.quick else StageSettings()
+stages = (
+    StageSettings(relaxed_steps=2, assigned_steps=2, reassignments=0, path_steps=4)
+    if arguments.quick
+    else StageSettings()
+)
 
 # 3. All stages; results, figures and index.html go to the folder.
-result = optimize_kit(designs, parts, out=arguments.out, settings=JobSettings(stages=stages, jobs=arguments.jobs),
-                      inputs=select_files(MODELS, number), resume=arguments.resume, overwrite=True, progress=True)
+result = optimize_kit(
+    designs,
+    parts,
+    out=arguments.out,
+    settings=JobSettings(stages=stages, jobs=arguments.jobs),
+    inputs=select_files(MODELS, number),
+    resume=arguments.resume,
+    overwrite=True,
+    progress=True,
+)
 picture = with_palette((arguments.out / "designs.png").read_bytes(), 128)
 write_bytes(arguments.out / "picture.png", picture, overwrite=True)
 
 # 4. What came out: largest deviation of the joints from the target, in % of its bounding box.
 for n, design in enumerate(designs):
-    figures = {stage: result.summary(stage, n) for stage in ("direct", "unrelaxed", "relaxed", "assigned")}
-    shown = {stage: f["failed"] if "failed" in f else f"{f['fit']['max_percent']:.2f} %" for stage, f in figures.items()}
+    figures = {
+        stage: result.summary(stage, n) for stage in ("direct", "unrelaxed", "relaxed", "assigned")
+    }
+    shown = {
+        stage: f["failed"] if "failed" in f else f"{f['fit']['max_percent']:.2f} %"
+        for stage, f in figures.items()
+    }
     print(f"{design.name:12s}", shown)

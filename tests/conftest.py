@@ -1,4 +1,5 @@
 """Fixtures for all tests."""
+
 from __future__ import annotations
 
 import json
@@ -17,7 +18,8 @@ def repository() -> Path:
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """Released data files that lie beside the repository and aren't part of it; the test is skipped without them."""
+    """Released data files that lie beside the repository and aren't part of it; the test is skipped
+    without them."""
     folder = REPOSITORY.parent / "shared" / "data"
     if not folder.is_dir():
         pytest.skip("needs the released data files beside the repository")
@@ -26,15 +28,24 @@ def shared_data() -> Path:
 
 @pytest.fixture
 def c_shell_data() -> dict:
-    """The content of a valid C-shell design file: a uniform grid of 3 x 3 crossing straight curves."""
-    lines = [[[-0.2, y], [2.2, y]] for y in (0.0, 1.0, 2.0)] + [[[x, -0.2], [x, 2.2]] for x in (0.0, 1.0, 2.0)]
+    """The content of a valid C-shell design file: a uniform grid of 3 x 3 crossing straight
+    curves."""
+    lines = [[[-0.2, y], [2.2, y]] for y in (0.0, 1.0, 2.0)] + [
+        [[x, -0.2], [x, 2.2]] for x in (0.0, 1.0, 2.0)
+    ]
     return {
-        "format": "kop_exudyn/design", "version": 1, "class": "c_shell", "name": "grid",
+        "format": "kop_exudyn/design",
+        "version": 1,
+        "class": "c_shell",
+        "name": "grid",
         "material": {"young": 2100.0, "poisson": 0.35},
         "section": {"type": "rectangle", "width": 0.02, "height": 0.01},
         "curves": [{"type": "polyline", "points": points} for points in lines],
-        "crossings": "find", "free_ends": False, "rod_offset": 0.0,
-        "opening": {"angle": 0.6, "side": "up"}, "elements_per_piece": 2,
+        "crossings": "find",
+        "free_ends": False,
+        "rod_offset": 0.0,
+        "opening": {"angle": 0.6, "side": "up"},
+        "elements_per_piece": 2,
     }
 
 

@@ -1,4 +1,5 @@
 """The package's public names: all there, and none of them loaded before it is used."""
+
 import subprocess
 import sys
 
@@ -12,7 +13,8 @@ def test_every_public_name_is_found():
 
 
 def test_import_loads_no_library():
-    code = "import sys, kop_exudyn; print(*(m for m in ('numpy', 'exudyn', 'matplotlib') if m in sys.modules))"
+    libraries = ("numpy", "exudyn", "matplotlib")
+    code = f"import sys, kop_exudyn; print(*(m for m in {libraries} if m in sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""
 

@@ -1,4 +1,5 @@
 """The command line: what it accepts, what it says, and with which exit status it ends."""
+
 import io
 import json
 import logging
@@ -19,10 +20,24 @@ from kop_exudyn.report import kit_run
 from kop_exudyn.structures import base
 
 ANSWER = {
-    "design": "arch", "unknowns": 120, "elements": 20, "newton_iterations": 12, "wall_s": 0.5, "elastic_energy": 1.25,
-    "stable": True, "opening_angle": 0.6, "exudyn": {"version": "1.13", "newton_steps": 1, "residual": 1e-12,
-                                                    "moved": 1e-12, "wall_s": 0.1},
-    "fit": {"max_percent": 1.5, "mean_percent": 0.5}, "displaced_percent": 2.5, "joints": [[0.0, 0.0, 0.0]],
+    "design": "arch",
+    "unknowns": 120,
+    "elements": 20,
+    "newton_iterations": 12,
+    "wall_s": 0.5,
+    "elastic_energy": 1.25,
+    "stable": True,
+    "opening_angle": 0.6,
+    "exudyn": {
+        "version": "1.13",
+        "newton_steps": 1,
+        "residual": 1e-12,
+        "moved": 1e-12,
+        "wall_s": 0.1,
+    },
+    "fit": {"max_percent": 1.5, "mean_percent": 0.5},
+    "displaced_percent": 2.5,
+    "joints": [[0.0, 0.0, 0.0]],
     "strength": {"deployed": {"equivalent_stress": 3e7, "utilisation": 0.75, "element": 3}},
 }
 
@@ -40,9 +55,15 @@ def quiet_loggers():
 @pytest.fixture
 def design_file(monkeypatch, write_json_file):
     """A design of a class whose reader only keeps the name."""
-    monkeypatch.setitem(base._REGISTRY, "named", lambda data, source: SimpleNamespace(name=data["name"], fit_weight=1e5))
-    return write_json_file("set/arch.json", {"format": "kop_exudyn/design", "version": 1, "class": "named",
-                                             "name": "arch"})
+    monkeypatch.setitem(
+        base._REGISTRY,
+        "named",
+        lambda data, source: SimpleNamespace(name=data["name"], fit_weight=1e5),
+    )
+    return write_json_file(
+        "set/arch.json",
+        {"format": "kop_exudyn/design", "version": 1, "class": "named", "name": "arch"},
+    )
 
 
 @pytest.fixture
@@ -88,51 +109,82 @@ class TestHelp:
         assert capsys.readouterr().out == f"kop_exudyn {__version__}\n"
 
     def test_help_is_quick_and_loads_no_library(self):
-        code = ("import sys\nfrom kop_exudyn.cli import make_parser\nmake_parser().format_help()\n"
-                "print(*(m for m in ('numpy', 'scipy', 'exudyn', 'matplotlib', 'jsonschema', 'shtab') if m in sys.modules))")
+        code = (
+            "import sys\nfrom kop_exudyn.cli import make_parser\nmake_parser().format_help()\n"
+            "print(*(m for m in ('numpy', 'scipy', 'exudyn', 'matplotlib', 'jsonschema', 'shtab') "
+            "if m in sys.modules))"
+        )
         begin = time.perf_counter()
-        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        done = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        )
         assert done.stdout.strip() == ""
-        assert time.perf_counter() - begin < 3  # a tenth of a second on an idle machine; this one may be busy
+        # a tenth of a second on an idle machine; this one may be busy
+        assert time.perf_counter() - begin < 3
 
     def test_as_a_module(self):
-        done = subprocess.run([sys.executable, "-m", "kop_exudyn", "--version"], capture_output=True, text=True)
+        done = subprocess.run(
+            [sys.executable, "-m", "kop_exudyn", "--version"], capture_output=True, text=True
+        )
         assert (done.returncode, done.stdout) == (0, f"kop_exudyn {__version__}\n")
 
 
 class TestArguments:
-    @pytest.mark.parametrize("parts, message", [
-        ("linear", "expected KIND=NUMBER,..., got 'linear'"),
-        ("linear=0", "the number of linear parts must be a whole number, at least 1, got '0'"),
-        ("linear=-3", "got '-3'"),
-        ("linear=2.5", "got '2.5'"),
-        ("linear=", "got ''"),
-        ("=3", "expected KIND=NUMBER"),
-        ("linear=3,,angular=2", "expected KIND=NUMBER"),
-        ("linear=3,linear=4", "the kind 'linear' is given twice"),
-    ])
+    @pytest.mark.parametrize(
+        "parts, message",
+        [
+            ("linear", "expected KIND=NUMBER,..., got 'linear'"),
+            ("linear=0", "the number of linear parts must be a whole number, at least 1, got '0'"),
+            ("linear=-3", "got '-3'"),
+            ("linear=2.5", "got '2.5'"),
+            ("linear=", "got ''"),
+            ("=3", "expected KIND=NUMBER"),
+            ("linear=3,,angular=2", "expected KIND=NUMBER"),
+            ("linear=3,linear=4", "the kind 'linear' is given twice"),
+        ],
+    )
     def test_parts_that_make_no_sense(self, parts, message, capsys, tmp_path):
         assert status_of("optimize", tmp_path, "--parts", parts, "--out", tmp_path / "out") == 2
         error = capsys.readouterr().err
         assert message in error and error.count("\n") == 1
 
     def test_unknown_kind_of_parts(self, capsys, design_file, tmp_path):
-        assert status_of("optimize", design_file.parent, "--parts", "cubic=3", "--out", tmp_path / "out") == 2
+        assert (
+            status_of(
+                "optimize", design_file.parent, "--parts", "cubic=3", "--out", tmp_path / "out"
+            )
+            == 2
+        )
         error = capsys.readouterr().err
         assert "'cubic': unknown kind of parts (known: angular," in error and error.count("\n") == 1
         assert not (tmp_path / "out").exists()
 
-    @pytest.mark.parametrize("arguments, message", [
-        ((), "required: COMMAND"),
-        (("fly",), "invalid choice: 'fly'"),
-        (("simulate",), "required: DESIGN"),
-        (("optimize", "x", "--parts", "linear=1"), "required: --out"),
-        (("optimize", "x", "--parts", "linear=1", "--out", "y", "--jobs", "0"), "--jobs: the value must be a whole"),
-        (("optimize", "x", "--parts", "linear=1", "--out", "y", "--designs", "0"), "--designs: the number of"),
-        (("optimize", "x", "--parts", "linear=1", "--out", "y", "--designs", "a,,b"), "--designs: expected a number"),
-        (("optimize", "x", "--parts", "linear=1", "--out", "y", "--seed", "-1"), "--seed: the value must be a whole"),
-        (("simulate", "x", "-q", "-v"), "not allowed with"),
-    ])
+    @pytest.mark.parametrize(
+        "arguments, message",
+        [
+            ((), "required: COMMAND"),
+            (("fly",), "invalid choice: 'fly'"),
+            (("simulate",), "required: DESIGN"),
+            (("optimize", "x", "--parts", "linear=1"), "required: --out"),
+            (
+                ("optimize", "x", "--parts", "linear=1", "--out", "y", "--jobs", "0"),
+                "--jobs: the value must be a whole",
+            ),
+            (
+                ("optimize", "x", "--parts", "linear=1", "--out", "y", "--designs", "0"),
+                "--designs: the number of",
+            ),
+            (
+                ("optimize", "x", "--parts", "linear=1", "--out", "y", "--designs", "a,,b"),
+                "--designs: expected a number",
+            ),
+            (
+                ("optimize", "x", "--parts", "linear=1", "--out", "y", "--seed", "-1"),
+                "--seed: the value must be a whole",
+            ),
+            (("simulate", "x", "-q", "-v"), "not allowed with"),
+        ],
+    )
     def test_one_line_and_status_2(self, arguments, message, capsys):
         assert status_of(*arguments) == 2
         output = capsys.readouterr()
@@ -155,20 +207,36 @@ class TestSimulate:
         simulated["error"] = SimulationFailure("no equilibrium", where="deployed state")
         assert status_of("simulate", design_file, "--json") == 1
         output = capsys.readouterr()
-        assert json.loads(output.out) == {"design": "arch", "failed": "deployed state: no equilibrium"}
+        assert json.loads(output.out) == {
+            "design": "arch",
+            "failed": "deployed state: no equilibrium",
+        }
         assert output.err == "kop: simulation failed: deployed state: no equilibrium\n"
 
     def test_a_failure_is_one_line_without(self, design_file, simulated, capsys):
         simulated["error"] = SimulationFailure("no equilibrium,\nnot even one")
         assert status_of("simulate", design_file) == 1
         output = capsys.readouterr()
-        assert output.out == "" and output.err == "kop: simulation failed: no equilibrium, not even one\n"
+        assert (
+            output.out == ""
+            and output.err == "kop: simulation failed: no equilibrium, not even one\n"
+        )
 
-    @pytest.mark.parametrize("content, message", [
-        ("{", "not JSON: line 1, column 2"),
-        ('{"format": "kop_exudyn/design", "version": 1, "class": "c_shell", "name": "a", "young": NaN}', "NaN is not"),
-        ('{"format": "kop_exudyn/design", "version": 9}', "version = 9: written for a newer kop_exudyn"),
-    ])
+    @pytest.mark.parametrize(
+        "content, message",
+        [
+            ("{", "not JSON: line 1, column 2"),
+            (
+                '{"format": "kop_exudyn/design", "version": 1, "class": "c_shell", "name": "a", '
+                '"young": NaN}',
+                "NaN is not",
+            ),
+            (
+                '{"format": "kop_exudyn/design", "version": 9}',
+                "version = 9: written for a newer kop_exudyn",
+            ),
+        ],
+    )
     def test_unusable_files(self, content, message, tmp_path, capsys):
         file = tmp_path / "bad.json"
         file.write_text(content)
@@ -200,7 +268,10 @@ class TestOptimize:
 
         def optimize_kit(designs, parts, **options):
             asked.update(designs=[design.name for design in designs], parts=parts, **options)
-            summary = lambda stage, n: {"failed": "no"} if designs[n].name in asked["failed"] else {}  # noqa: E731
+
+            def summary(stage, n):
+                return {"failed": "no"} if designs[n].name in asked["failed"] else {}
+
             return SimpleNamespace(designs=designs, summary=summary)
 
         monkeypatch.setattr(kit_run, "optimize_kit", optimize_kit)
@@ -208,8 +279,27 @@ class TestOptimize:
 
     def test_options_arrive(self, asked, design_file, tmp_path, capsys):
         out = tmp_path / "out"
-        assert status_of("optimize", design_file.parent, "--parts", "linear=12,angular=5", "--out", out, "--seed", 3,
-                         "--jobs", 2, "--max-steps", 7, "--designs", 1, "--resume", "-q") == 0
+        assert (
+            status_of(
+                "optimize",
+                design_file.parent,
+                "--parts",
+                "linear=12,angular=5",
+                "--out",
+                out,
+                "--seed",
+                3,
+                "--jobs",
+                2,
+                "--max-steps",
+                7,
+                "--designs",
+                1,
+                "--resume",
+                "-q",
+            )
+            == 0
+        )
         assert asked["designs"] == ["arch"] and asked["parts"] == {"linear": 12, "angular": 5}
         assert asked["out"] == out and asked["inputs"] == (design_file,)
         assert (asked["resume"], asked["overwrite"], asked["progress"]) == (True, False, False)
@@ -218,42 +308,86 @@ class TestOptimize:
         assert settings.stages.relaxed_steps == settings.stages.assigned_steps == 7
         assert capsys.readouterr().out == f"{out / 'index.html'}\n"
 
-    def test_a_study_file_and_options_that_come_before_it(self, asked, design_file, tmp_path, capsys):
+    def test_a_study_file_and_options_that_come_before_it(
+        self, asked, design_file, tmp_path, capsys
+    ):
         study = tmp_path / "study.toml"
-        study.write_text('format = "kop_exudyn/study"\nversion = 1\ndesigns = ["set/arch.json"]\nbaselines = false\n'
-                         "parts = {linears = 7}\nsettings = {seed = 4, redeployments = 2, relaxed_steps = 9}\n")
+        study.write_text(
+            'format = "kop_exudyn/study"\nversion = 1\ndesigns = ["set/arch.json"]\nbaselines = '
+            "false\n"
+            "parts = {linears = 7}\nsettings = {seed = 4, redeployments = 2, relaxed_steps = 9}\n"
+        )
         assert status_of("optimize", study, "--out", tmp_path / "out", "--jobs", 1) == 0
         assert asked["parts"] == {"linear": 7} and asked["inputs"] == (design_file,)
         settings = asked["settings"]
-        assert (settings.stages.seed, settings.stages.redeployments, settings.stages.relaxed_steps) == (4, 2, 9)
+        assert (
+            settings.stages.seed,
+            settings.stages.redeployments,
+            settings.stages.relaxed_steps,
+        ) == (4, 2, 9)
         assert settings.baselines is False
-        assert status_of("optimize", study, "--out", tmp_path / "out", "--seed", 0, "--parts", "linear=3,angular=1",
-                         "--max-steps", 5) == 0
+        assert (
+            status_of(
+                "optimize",
+                study,
+                "--out",
+                tmp_path / "out",
+                "--seed",
+                0,
+                "--parts",
+                "linear=3,angular=1",
+                "--max-steps",
+                5,
+            )
+            == 0
+        )
         assert asked["parts"] == {"linear": 3, "angular": 1}
         stages = asked["settings"].stages
-        assert (stages.seed, stages.redeployments, stages.relaxed_steps, stages.assigned_steps) == (0, 2, 5, 5)
+        assert (stages.seed, stages.redeployments, stages.relaxed_steps, stages.assigned_steps) == (
+            0,
+            2,
+            5,
+            5,
+        )
 
     def test_parts_must_come_from_somewhere(self, asked, design_file, tmp_path, capsys):
         assert status_of("optimize", design_file.parent, "--out", tmp_path / "out") == 2
         assert "--parts or --kit is required" in capsys.readouterr().err and "parts" not in asked
 
     def test_a_kit_that_exists(self, asked, design_file, tmp_path, capsys):
-        file = save_kit(tmp_path / "kit.json", Kit({"linear": [[0.1, 0.2], [0.3, 0.3]], "angular": [0.2]}))
+        file = save_kit(
+            tmp_path / "kit.json", Kit({"linear": [[0.1, 0.2], [0.3, 0.3]], "angular": [0.2]})
+        )
         arguments = ("optimize", design_file.parent, "--out", tmp_path / "out", "--kit")
         assert status_of(*arguments, file) == 0
-        assert asked["parts"] == {"linear": 2, "angular": 1} and asked["kit"].to_dict() == load_kit(file).to_dict()
+        assert (
+            asked["parts"] == {"linear": 2, "angular": 1}
+            and asked["kit"].to_dict() == load_kit(file).to_dict()
+        )
         assert status_of(*arguments, file, "--parts", "linear=2") == 2
         assert "give --kit or --parts" in capsys.readouterr().err
         assert status_of(*arguments, tmp_path / "no.json") == 2
         assert "no.json: no such file" in capsys.readouterr().err
 
     def test_weights_of_terms(self, asked, design_file, tmp_path, capsys):
-        arguments = ("optimize", design_file.parent, "--parts", "linear=1", "--out", tmp_path / "out", "--weights")
+        arguments = (
+            "optimize",
+            design_file.parent,
+            "--parts",
+            "linear=1",
+            "--out",
+            tmp_path / "out",
+            "--weights",
+        )
         assert status_of(*arguments, "energy=0.5,stress=2") == 0
         weights = asked["settings"].weights
         assert (weights.fit, weights.energy, weights.others) == (1e5, 0.5, (("stress", 2.0),))
-        for text, message in (("beauty=1", "weights = 'beauty': unknown term"), ("stress=x", "expected TERM=WEIGHT"),
-                              ("stress=-1", "weights.stress = -1"), ("fit=1,fit=2", "given twice")):
+        for text, message in (
+            ("beauty=1", "weights = 'beauty': unknown term"),
+            ("stress=x", "expected TERM=WEIGHT"),
+            ("stress=-1", "weights.stress = -1"),
+            ("fit=1,fit=2", "given twice"),
+        ):
             capsys.readouterr()
             assert status_of(*arguments, text) == 2
             error = capsys.readouterr().err
@@ -261,15 +395,26 @@ class TestOptimize:
 
     def test_names_that_are_too_long_for_a_file(self, capsys, tmp_path):
         long = "n" * 300
-        for arguments in (("simulate", long), ("view", long, "--out", "y"), ("optimize", long, "--parts", "linear=1", "--out", "y"),
-                          ("export", long, long, "--unit", "m", "--out", long)):
+        for arguments in (
+            ("simulate", long),
+            ("view", long, "--out", "y"),
+            ("optimize", long, "--parts", "linear=1", "--out", "y"),
+            ("export", long, long, "--unit", "m", "--out", long),
+        ):
             assert status_of(*arguments) == 2
             error = capsys.readouterr().err
             assert error.startswith(f"kop: {long}: ") and error.count("\n") == 1
 
     def test_a_design_that_fails_in_the_end(self, asked, design_file, tmp_path, capsys):
         asked["failed"] = ["arch"]
-        arguments = ("optimize", design_file.parent, "--parts", "linear=1", "--out", tmp_path / "out")
+        arguments = (
+            "optimize",
+            design_file.parent,
+            "--parts",
+            "linear=1",
+            "--out",
+            tmp_path / "out",
+        )
         assert status_of(*arguments) == 1
         assert "can't be built from the kit: arch" in capsys.readouterr().err
         assert status_of(*arguments, "--json") == 1
@@ -278,15 +423,27 @@ class TestOptimize:
         assert data["result"] == (tmp_path / "out" / "result.json").as_posix()
 
     def test_designs_by_name(self, asked, design_file, tmp_path, capsys):
-        arguments = ("optimize", design_file.parent, "--parts", "linear=1", "--out", tmp_path / "out", "--designs")
+        arguments = (
+            "optimize",
+            design_file.parent,
+            "--parts",
+            "linear=1",
+            "--out",
+            tmp_path / "out",
+            "--designs",
+        )
         assert status_of(*arguments, "arch") == 0
         assert status_of(*arguments, "arch,vault") == 2
         assert "designs = 'vault': no such design (there are arch)" in capsys.readouterr().err
 
 
 def test_verbosity(design_file, simulated):
-    for flags, level in (([], logging.WARNING), (["-v"], logging.INFO), (["-vv"], logging.DEBUG),
-                         (["-q"], logging.ERROR)):
+    for flags, level in (
+        ([], logging.WARNING),
+        (["-v"], logging.INFO),
+        (["-vv"], logging.DEBUG),
+        (["-q"], logging.ERROR),
+    ):
         assert status_of("simulate", design_file, *flags) == 0
         assert logging.getLogger("kop_exudyn").level == level
         assert len(logging.getLogger("kop_exudyn").handlers) == 1
@@ -297,8 +454,10 @@ class Terminal(io.StringIO):
         return True
 
 
-@pytest.mark.parametrize("variables, coloured", [
-    ({}, True), ({"NO_COLOR": "1"}, False), ({"NO_COLOR": ""}, True), ({"TERM": "dumb"}, False)])
+@pytest.mark.parametrize(
+    "variables, coloured",
+    [({}, True), ({"NO_COLOR": "1"}, False), ({"NO_COLOR": ""}, True), ({"TERM": "dumb"}, False)],
+)
 def test_colours_on_terminals_only(variables, coloured, monkeypatch, tmp_path, capsys):
     for name, value in ({"TERM": "xterm"} | variables).items():
         monkeypatch.setenv(name, value)
@@ -310,8 +469,11 @@ def test_colours_on_terminals_only(variables, coloured, monkeypatch, tmp_path, c
     assert status_of("simulate", tmp_path / "no.json") == 2
     assert sys.stderr.getvalue().startswith("\033[31mkop:\033[0m " if coloured else "kop: ")
     logging.getLogger("kop_exudyn").warning("mind the gap")
-    assert sys.stderr.getvalue().endswith("kop: \033[33mWARNING\033[0m: mind the gap\n" if coloured else
-                                          "kop: WARNING: mind the gap\n")
+    assert sys.stderr.getvalue().endswith(
+        "kop: \033[33mWARNING\033[0m: mind the gap\n"
+        if coloured
+        else "kop: WARNING: mind the gap\n"
+    )
 
 
 def test_messages_are_one_line_whatever_the_value(design_file, simulated, capsys):
@@ -323,16 +485,13 @@ def test_messages_are_one_line_whatever_the_value(design_file, simulated, capsys
 @pytest.mark.parametrize("joints", [1, 100_000])
 def test_a_reader_that_stops_early_is_no_error(joints):
     code = f"""
-import sys
-from types import SimpleNamespace
-from kop_exudyn import cli
-from kop_exudyn.analysis import simulation
-from kop_exudyn.io import designs
-designs.load_design = lambda path: None
-simulation.simulate = lambda design: SimpleNamespace(to_dict=lambda: {{"joints": [[0.0] * 3] * {joints}}})
-sys.exit(cli.main(["simulate", "x", "--json"]))
-"""
-    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+import sys from types import SimpleNamespace from kop_exudyn import cli from kop_exudyn.analysis
+import simulation from kop_exudyn.io import designs designs.load_design = lambda path: None
+simulation.simulate = lambda design: SimpleNamespace(to_dict=lambda: {{"joints": [[0.0] * 3] *
+{joints}}}) sys.exit(cli.main(["simulate", "x", "--json"])) """
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     process.stdout.close()
     with process.stderr:
         assert process.stderr.read() == ""

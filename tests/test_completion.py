@@ -1,4 +1,5 @@
 """Completion scripts: the shells themselves read them."""
+
 import json
 import shutil
 import subprocess
@@ -29,9 +30,17 @@ def test_bash_completes(capsys):
 
     def completed(*words: str) -> set[str]:
         line = " ".join(f"'{word}'" for word in words)
-        done = subprocess.run(["bash", "--norc"], text=True, capture_output=True, check=True, input=(
-            f"{script}\nCOMP_WORDS=({line})\nCOMP_CWORD={len(words) - 1}\nCOMP_LINE='{' '.join(words)}'\n"
-            f'COMP_POINT=${{#COMP_LINE}}\n{function}\nprintf "%s\\n" "${{COMPREPLY[@]}}"\n'))
+        done = subprocess.run(
+            ["bash", "--norc"],
+            text=True,
+            capture_output=True,
+            check=True,
+            input=(
+                f"{script}\nCOMP_WORDS=({line})\nCOMP_CWORD={len(words) - 1}\n"
+                f"COMP_LINE='{' '.join(words)}'\n"
+                f'COMP_POINT=${{#COMP_LINE}}\n{function}\nprintf "%s\\n" "${{COMPREPLY[@]}}"\n'
+            ),
+        )
         return set(done.stdout.split())
 
     assert completed("kop", "") >= set(NAMES)

@@ -1,10 +1,30 @@
 """The order of the package's folders: each knows only those before it."""
-import ast
-from pathlib import Path
-from typing import Iterator
 
-FOLDERS = ("errors", "memory", "plugins", "rods", "scene", "equilibrium", "structures", "kit", "optimize", "analysis",
-           "io", "report", "commands", "cli")
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+FOLDERS = (
+    "errors",
+    "plugins",
+    "geometry",
+    "sqp",
+    "files",
+    "drawing",
+    "kit",
+    "rods",
+    "scene",
+    "equilibrium",
+    "structures",
+    "search",
+    "analysis",
+    "io",
+    "fabrication",
+    "exchange",
+    "report",
+    "commands",
+    "cli",
+)
 
 
 def imported(file: Path, package: Path) -> Iterator[tuple[str, int]]:
@@ -13,7 +33,7 @@ def imported(file: Path, package: Path) -> Iterator[tuple[str, int]]:
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom):
             module = (node.module or "").split(".") if node.module else []
-            whole = [*own[:len(own) - node.level], *module] if node.level else module[1:]
+            whole = [*own[: len(own) - node.level], *module] if node.level else module[1:]
             if node.level or node.module and node.module.split(".")[0] == package.name:
                 for name in [whole[0]] if whole else [alias.name for alias in node.names]:
                     yield name, node.lineno
@@ -25,7 +45,11 @@ def imported(file: Path, package: Path) -> Iterator[tuple[str, int]]:
 
 def test_folders_know_only_those_before_them(repository):
     package = repository / "kop_exudyn"
-    files = [file for file in package.rglob("*.py") if file.parent != package or file.stem not in ("__init__", "__main__")]
+    files = [
+        file
+        for file in package.rglob("*.py")
+        if file.parent != package or file.stem not in ("__init__", "__main__")
+    ]
     seen, wrong = 0, []
     for file in files:
         own = file.relative_to(package).with_suffix("").parts[0]
@@ -39,7 +63,9 @@ def test_folders_know_only_those_before_them(repository):
 
 def test_every_folder_has_its_place(repository):
     package = repository / "kop_exudyn"
-    names = {p.name for p in package.iterdir() if (p / "__init__.py").exists()} | {p.stem for p in package.glob("*.py")}
+    names = {p.name for p in package.iterdir() if (p / "__init__.py").exists()} | {
+        p.stem for p in package.glob("*.py")
+    }
     assert names - {"__init__", "__main__"} == set(FOLDERS)
 
 
@@ -47,7 +73,15 @@ def test_an_import_from_a_later_folder_is_seen(tmp_path):
     package = tmp_path / "kop_exudyn"
     (package / "rods").mkdir(parents=True)
     file = package / "rods" / "section.py"
-    file.write_text("from ..kit.parts import Kit\nfrom .. import io\n"
-                    "def f():\n    import kop_exudyn.report.study\n    from kop_exudyn.analysis import reuse\n"
-                    "from .element import x\nimport numpy.kit\nfrom kit import y\n")
-    assert sorted(imported(file, package)) == [("analysis", 5), ("io", 2), ("kit", 1), ("report", 4), ("rods", 6)]
+    file.write_text(
+        "from ..kit.parts import Kit\nfrom .. import io\n"
+        "def f():\n    import kop_exudyn.report.study\n    from kop_exudyn.analysis import reuse\n"
+        "from .element import x\nimport numpy.kit\nfrom kit import y\n"
+    )
+    assert sorted(imported(file, package)) == [
+        ("analysis", 5),
+        ("io", 2),
+        ("kit", 1),
+        ("report", 4),
+        ("rods", 6),
+    ]

@@ -1,9 +1,8 @@
 """``kop import``: released umbrella meshes as designs."""
+
 from __future__ import annotations
 
 import json
-
-import pytest
 
 from kop_exudyn.cli import main
 
@@ -25,8 +24,23 @@ def test_an_existing_file_is_kept(tmp_path, capsys):
 
 def test_a_released_mesh_becomes_a_design(tmp_path, shared_data):
     out = tmp_path / "saddle.json"
-    assert main(["import", str(shared_data / "umbrella" / "saddle_5t.json.gz"), "--out", str(out)]) == 0
+    assert (
+        main(["import", str(shared_data / "umbrella" / "saddle_5t.json.gz"), "--out", str(out)])
+        == 0
+    )
     assert json.loads(out.read_text())["class"] == "umbrella"
-    assert main(["import", str(shared_data / "umbrella" / "saddle_5t.json.gz"), "--out", str(out), "--overwrite",
-                 "--plates", "rigid"]) == 0
+    assert (
+        main(
+            [
+                "import",
+                str(shared_data / "umbrella" / "saddle_5t.json.gz"),
+                "--out",
+                str(out),
+                "--overwrite",
+                "--plates",
+                "rigid",
+            ]
+        )
+        == 0
+    )
     assert json.loads(out.read_text())["plate_model"] == "rigid"

@@ -1,4 +1,5 @@
 """``kop view`` and ``kop export`` of a finished run, from its folder and the designs' files."""
+
 from __future__ import annotations
 
 import json
@@ -9,33 +10,49 @@ import numpy as np
 import pytest
 
 from kop_exudyn.cli import main
-from kop_exudyn.io.designs import load_designs
+from kop_exudyn.io.datasets import load_designs
 from kop_exudyn.io.saved_runs import load_run
-from kop_exudyn.optimize.job import JobSettings
-from kop_exudyn.optimize.stage_settings import StageSettings
 from kop_exudyn.report.kit_run import optimize_kit
 from kop_exudyn.report.viewer_scenes import kit_scene
+from kop_exudyn.search.job import JobSettings
+from kop_exudyn.search.settings import StageSettings
 
 
 def shell(name: str, bow: float) -> dict:
     along = [[[-1.2, y - bow], [0, y], [1.2, y - 0.1]] for y in (-0.5, 0.4)]
     across = [[[x, -0.9], [x * 1.1 + bow / 5, 0], [x, 0.9]] for x in (-0.8, 0.05, 0.7)]
-    return {"format": "kop_exudyn/design", "version": 1, "class": "c_shell", "name": name, "opening": {"angle": 0.3},
-            "free_ends": False, "material": {"young": 2.1e9, "poisson": 0.35, "elastic_limit": 4e7},
-            "section": {"type": "rectangle", "width": 0.03, "height": 0.004},
-            "curves": [{"type": "spline", "points": points} for points in along + across]}
+    return {
+        "format": "kop_exudyn/design",
+        "version": 1,
+        "class": "c_shell",
+        "name": name,
+        "opening": {"angle": 0.3},
+        "free_ends": False,
+        "material": {"young": 2.1e9, "poisson": 0.35, "elastic_limit": 4e7},
+        "section": {"type": "rectangle", "width": 0.03, "height": 0.004},
+        "curves": [{"type": "spline", "points": points} for points in along + across],
+    }
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    """Folders of a finished run and of its designs, among which there is one that it doesn't use."""
+    """Folders of a finished run and of its designs, among which there is one that it doesn't
+    use."""
     folder = tmp_path_factory.mktemp("kit")
     (folder / "designs").mkdir()
     for name, bow in (("flat", 0.1), ("bent", 0.16), ("unused", 0.2)):
-        (folder / "designs" / f"{name}.json").write_text(json.dumps(shell(name, bow)), encoding="utf-8")
-    stages = StageSettings(schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2)
-    optimize_kit(load_designs(folder / "designs", ["flat", "bent"]), {"linear": 2, "angular": 2}, out=folder / "run",
-                 settings=JobSettings(jobs=1, stages=stages))
+        (folder / "designs" / f"{name}.json").write_text(
+            json.dumps(shell(name, bow)), encoding="utf-8"
+        )
+    stages = StageSettings(
+        schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2
+    )
+    optimize_kit(
+        load_designs(folder / "designs", ["flat", "bent"]),
+        {"linear": 2, "angular": 2},
+        out=folder / "run",
+        settings=JobSettings(jobs=1, stages=stages),
+    )
     return folder / "run", folder / "designs"
 
 
@@ -51,7 +68,11 @@ def test_view_shows_all_stages_and_the_way_to_the_opening(run, tmp_path, capsys)
         stages = {state["stage"] for state in design["states"]} | set(design["failed"])
         assert stages == {"input", "direct", "unrelaxed", "relaxed", "assigned"}
         assert sum(not state["final"] for state in design["states"]) == 2
-        notes = [state["note"] for state in design["states"] if state["role"] == "deployed" and state["final"]]
+        notes = [
+            state["note"]
+            for state in design["states"]
+            if state["role"] == "deployed" and state["final"]
+        ]
         wanted = r"off target: max .* %, mean .* % · stress: max \d+ % of its limit"
         assert all(re.fullmatch(wanted, note) for note in notes)
 
@@ -60,15 +81,18 @@ def test_the_page_of_a_read_run_is_that_of_the_run(run):
     again = kit_scene(load_run(run[0], load_designs(run[1])))
     html = (run[0] / "viewer.html").read_text(encoding="utf-8")
     written = json.loads(re.search(r'id="scene">(.*?)</script>', html, re.S).group(1))
-    assert [(s["stage"], s["role"], s["note"]) for d in written["designs"] for s in d["states"]] == [
-        (s.stage, s.role, s.note) for d in again.designs for s in d.states]
+    assert [
+        (s["stage"], s["role"], s["note"]) for d in written["designs"] for s in d["states"]
+    ] == [(s.stage, s.role, s.note) for d in again.designs for s in d.states]
 
 
 def test_unusable_requests_of_view(run, tmp_path, capsys):
     page = tmp_path / "kit.html"
-    for arguments, message in (((str(run[0]),), "give also the folder of the designs"),
-                               ((str(run[1] / "flat.json"), str(run[1])), "expected the folder of a finished run"),
-                               ((str(tmp_path), str(run[1])), "result.json")):
+    for arguments, message in (
+        ((str(run[0]),), "give also the folder of the designs"),
+        ((str(run[1] / "flat.json"), str(run[1])), "expected the folder of a finished run"),
+        ((str(tmp_path), str(run[1])), "result.json"),
+    ):
         assert main(["view", *arguments, "--out", str(page)]) == 2
         error = capsys.readouterr().err
         assert message in error and error.count("\n") == 1
@@ -76,7 +100,10 @@ def test_unusable_requests_of_view(run, tmp_path, capsys):
 
 
 def test_export_writes_a_labelled_drawing_of_every_design(run, tmp_path, capsys):
-    assert main(["export", *map(str, run), "--unit", "m", "--out", str(tmp_path / "files"), "--json"]) == 0
+    assert (
+        main(["export", *map(str, run), "--unit", "m", "--out", str(tmp_path / "files"), "--json"])
+        == 0
+    )
     written = json.loads(capsys.readouterr().out)["files"]
     workshop = tmp_path / "files" / "workshop"
     assert set(written) == {str(path) for path in (tmp_path / "files").rglob("*.*")}
@@ -85,7 +112,11 @@ def test_export_writes_a_labelled_drawing_of_every_design(run, tmp_path, capsys)
         for suffix in ("csv", "svg", "pdf"):
             assert (workshop / f"assembly_{design.name}.{suffix}").stat().st_size > 1000
         root = ElementTree.parse(workshop / f"assembly_{design.name}.svg").getroot()
-        groups = [g for g in root.iter("{http://www.w3.org/2000/svg}g") if g.get("id", "").startswith("text_")]
+        groups = [
+            g
+            for g in root.iter("{http://www.w3.org/2000/svg}g")
+            if g.get("id", "").startswith("text_")
+        ]
         assert len(groups) >= design.n_elements + len(design.joints)
     assert not list(workshop.glob("*unused*"))
     before = {path: path.read_bytes() for path in workshop.iterdir()}
@@ -96,7 +127,9 @@ def test_export_writes_a_labelled_drawing_of_every_design(run, tmp_path, capsys)
 def test_sheets_holes_and_single_folders(run, tmp_path, capsys):
     command = ["export", *map(str, run), "--unit", "m", "--out", str(tmp_path)]
     assert main([*command, "--sheet", "200,100"]) == 2
-    assert "larger than a sheet's 170 x 56 mm" in capsys.readouterr().err and not list(tmp_path.iterdir())
+    assert "larger than a sheet's 170 x 56 mm" in capsys.readouterr().err and not list(
+        tmp_path.iterdir()
+    )
     assert main([*command, "--sheet", "0,100"]) == 2
     assert main([*command, "--only", "workshop", "--sheet", "3000,700", "--joint-hole", "6.5"]) == 0
     assert [path.name for path in tmp_path.iterdir()] == ["workshop"]
@@ -109,8 +142,14 @@ def test_sheets_holes_and_single_folders(run, tmp_path, capsys):
 def test_exported_vtu_has_strains_stresses_and_utilisation(run, tmp_path):
     assert main(["export", *map(str, run), "--unit", "m", "--out", str(tmp_path / "files")]) == 0
     tree = ElementTree.parse(tmp_path / "files" / "desk" / "flat_assigned_deployed.vtu")
-    cells = {array.get("Name"): np.array(array.text.split(), float) for array in tree.find(".//CellData")}
-    assert {"stretch", "twist", "curvature_y", "My", "equivalent_stress", "utilisation"} <= set(cells)
+    cells = {
+        array.get("Name"): np.array(array.text.split(), float) for array in tree.find(".//CellData")
+    }
+    assert {"stretch", "twist", "curvature_y", "My", "equivalent_stress", "utilisation"} <= set(
+        cells
+    )
     np.testing.assert_allclose(cells["utilisation"], cells["equivalent_stress"] / 4e7)
-    figures = json.loads((run[0] / "result.json").read_text())["designs"][0]["assigned"]["strength"]["deployed"]
+    figures = json.loads((run[0] / "result.json").read_text())["designs"][0]["assigned"][
+        "strength"
+    ]["deployed"]
     assert cells["utilisation"].max() == pytest.approx(figures["utilisation"], rel=1e-6)

@@ -1,12 +1,16 @@
 """The package's annotations hold: users' type checkers read them (py.typed)."""
+
 import importlib.resources
 import subprocess
 import sys
 
 
 def test_mypy_finds_no_errors(repository):
-    """With the configuration in setup.cfg; its cache is the usual one, so that a second run takes seconds."""
-    done = subprocess.run([sys.executable, "-m", "mypy"], cwd=repository, capture_output=True, text=True)
+    """With the configuration in setup.cfg; its cache is the usual one, so that a second run takes
+    seconds."""
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy"], cwd=repository, capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stdout + done.stderr
 
 

@@ -1,9 +1,11 @@
 """A deployed design under loads: held at its supports, with its own weight and forces on joints.
 
-The supports hold joints where the unloaded state has them, free to turn, instead of what fixes the free design in
-space; so without loads nothing changes. What opens the design (the mean opening angle of C-shells, an umbrella mesh's
-actuators) stays as it is. Loads grow in equal steps, so that the state is the one that the unloaded one deforms into.
+The supports hold joints where the unloaded state has them, free to turn, instead of what fixes the
+free design in space; so without loads nothing changes. What opens the design (the mean opening
+angle of C-shells, an umbrella mesh's actuators) stays as it is. Loads grow in equal steps, so that
+the state is the one that the unloaded one deforms into.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
@@ -19,8 +21,8 @@ from ..errors import InputError, SimulationFailure
 from ..scene.loads import DeadForces, Scaled, with_self_weight
 from ..scene.scene import Scene
 from ..structures.base import Design
-from ..structures.load_case import LoadCase, hold_in_place
-from .strength import Strength, material_values, materials_of, rod_strength
+from ..structures.loads import LoadCase, hold_in_place
+from ..structures.strength import Strength, material_values, materials_of, rod_strength
 
 _STEPS = 4
 _LOWER = 0.5  # of the height: joints below are supports
@@ -54,24 +56,33 @@ class LoadedState:
         return np.linalg.norm(self.displacements, axis=1)
 
     def to_dict(self) -> dict[str, Any]:
-        """As `kop simulate --json` has it: lengths in the design's units, percentages of the target's diagonal."""
+        """As `kop simulate --json` has it: lengths in the design's units, percentages of the
+        target's diagonal."""
         d, case = self.deflections, self.case
         return {
             "gravity": None if case.gravity is None else case.gravity.tolist(),
-            "total_force": self.total_force.tolist(), "supports": self.supports.tolist(),
-            "deflection": {"max": float(d.max()), "mean": float(d.mean()),
-                           "max_percent": 100 * float(d.max()) / self.diagonal,
-                           "mean_percent": 100 * float(d.mean()) / self.diagonal},
-            "elastic_energy": self.equilibrium.elastic_energy, "stable": self.equilibrium.stable,
-            "strength": self.strength.to_dict(), "exudyn": self.confirmation.to_dict(), "joints": self.joints.tolist(),
+            "total_force": self.total_force.tolist(),
+            "supports": self.supports.tolist(),
+            "deflection": {
+                "max": float(d.max()),
+                "mean": float(d.mean()),
+                "max_percent": 100 * float(d.max()) / self.diagonal,
+                "mean_percent": 100 * float(d.mean()) / self.diagonal,
+            },
+            "elastic_energy": self.equilibrium.elastic_energy,
+            "stable": self.equilibrium.stable,
+            "strength": self.strength.to_dict(),
+            "exudyn": self.confirmation.to_dict(),
+            "joints": self.joints.tolist(),
         }
 
 
 def loaded_state(design: Design, unloaded: Equilibrium, case: LoadCase) -> LoadedState:
     """The state that the deployed design's equilibrium deforms into under a load case.
 
-    Raises InputError where a density is missing or the supports don't hold the design, SimulationFailure when it finds
-    no equilibrium under all of the load, or Exudyn doesn't confirm it.
+    Raises InputError where a density is missing or the supports don't hold the design,
+    SimulationFailure when it finds no equilibrium under all of the load, or Exudyn doesn't confirm
+    it.
     """
     case.check(len(design.joints), design.name)
     role = design.fitted_role.name
@@ -91,17 +102,26 @@ def loaded_state(design: Design, unloaded: Equilibrium, case: LoadCase) -> Loade
         raise failure.within(f"{design.name}: under its loads") from None
     found = replace(found, state=confirmation.state)
     moved = scene.node_poses(found.state)[0] - scene.node_poses(unloaded.state)[0]
-    return LoadedState(case, supports, _total_force(scene, unloaded), moved, design.target.diagonal, found,
-                       confirmation, rod_strength(scene, found, materials_of(design)),
-                       design.report_positions(found.state))
+    return LoadedState(
+        case,
+        supports,
+        _total_force(scene, unloaded),
+        moved,
+        design.target.diagonal,
+        found,
+        confirmation,
+        rod_strength(scene, found, materials_of(design)),
+        design.report_positions(found.state),
+    )
 
 
 def supports_of(design: Design, unloaded: Equilibrium, case: LoadCase) -> np.ndarray:
-    """(k,) joints that hold the design: those of the load case, those that the design is pinned at, or chosen ones.
+    """(k,) joints that hold the design: those of the load case, those that the design is pinned at,
+    or chosen ones.
 
-    Chosen: corners of the joints' convex hull in plan (seen along gravity) that lie in the lower half of the height;
-    all of these corners where the lower ones don't surround the joints' mean, around which they would tip over.
-    Raises InputError when they lie on one line.
+    Chosen: corners of the joints' convex hull in plan (seen along gravity) that lie in the lower
+    half of the height; all of these corners where the lower ones don't surround the joints' mean,
+    around which they would tip over. Raises InputError when they lie on one line.
     """
     x = unloaded.state.positions[design.joints]
     pinned = _pinned_joints(design)
@@ -113,13 +133,18 @@ def supports_of(design: Design, unloaded: Equilibrium, case: LoadCase) -> np.nda
         down = _DOWN if case.gravity is None or not case.gravity.any() else case.gravity
         found = _outermost(x, down / np.linalg.norm(down))
     if not hold_in_place(x[found]):
-        raise InputError("supports on one line don't hold a structure", source=design.name, field="supports",
-                         value=found.tolist())
+        raise InputError(
+            "supports on one line don't hold a structure",
+            source=design.name,
+            field="supports",
+            value=found.tolist(),
+        )
     return found
 
 
 def _pinned_joints(design: Design) -> np.ndarray:
-    """Joints whose places the design itself prescribes, more than it takes to stop rigid motions."""
+    """Joints whose places the design itself prescribes, more than it takes to stop rigid
+    motions."""
     scene = design.scene(design.fitted_role.name)
     dofs = scene.driven.dofs[scene.driven.dofs < 6 * scene.n_bodies]
     kept = scene.pinned[: 6 * scene.n_bodies].reshape(-1, 6)[design.joints, :3].all(axis=1)
@@ -134,7 +159,9 @@ def _outermost(x: np.ndarray, down: np.ndarray) -> np.ndarray:
     try:
         outer = np.sort(ConvexHull(flat).vertices)
     except QhullError:
-        raise InputError("joints on one line in plan can't hold a structure", field="supports") from None
+        raise InputError(
+            "joints on one line in plan can't hold a structure", field="supports"
+        ) from None
     limit = height[outer].min() + _LOWER * np.ptp(height[outer])
     low = outer[height[outer] <= limit + 1e-9 * np.ptp(flat)]
     return low if _surround(flat[low], flat.mean(axis=0)) else outer
@@ -150,7 +177,8 @@ def _surround(points: np.ndarray, centre: np.ndarray) -> bool:
 
 
 def _held(scene: Scene, unloaded: Equilibrium, bodies: np.ndarray) -> Scene:
-    """The scene in its unloaded state, held by these bodies' positions instead of any other pins."""
+    """The scene in its unloaded state, held by these bodies' positions instead of any other
+    pins."""
     pinned = scene.pinned.copy()
     pinned[: 6 * scene.n_bodies] = False
     free = np.setdiff1d((6 * bodies[:, None] + np.arange(3)).ravel(), scene.driven.dofs)
@@ -158,7 +186,9 @@ def _held(scene: Scene, unloaded: Equilibrium, bodies: np.ndarray) -> Scene:
     return replace(scene, pinned=pinned, initial=unloaded.state)
 
 
-def _loaded(design: Design, scene: Scene, unloaded: Equilibrium, case: LoadCase, share: float) -> Scene:
+def _loaded(
+    design: Design, scene: Scene, unloaded: Equilibrium, case: LoadCase, share: float
+) -> Scene:
     """The held scene with a share of the loads."""
     terms = list(scene.terms)
     if len(case.joints):
@@ -167,24 +197,46 @@ def _loaded(design: Design, scene: Scene, unloaded: Equilibrium, case: LoadCase,
         materials = materials_of(design)
         density = material_values(scene, materials, "density")
         if not np.isfinite(density).all():
-            raise InputError("self-weight needs the density of every material", source=design.name,
-                             field="material.density")
+            raise InputError(
+                "self-weight needs the density of every material",
+                source=design.name,
+                field="material.density",
+            )
         scene = with_self_weight(scene, density, share * case.gravity)
-        terms += _rigid_weight(scene, unloaded, max(materials, key=lambda m: m.young).density, share * case.gravity)
+        terms += _rigid_weight(
+            scene, unloaded, max(materials, key=lambda m: m.young).density, share * case.gravity
+        )
     return scene.with_terms(*terms)
 
 
-def _rigid_weight(scene: Scene, unloaded: Equilibrium, density: float | None, gravity: np.ndarray) -> list[DeadForces]:
-    """The weight of pieces that don't bend, which are of the stiffest material, at their middles."""
-    rigid = [(chain, chain.section) for chain in scene.chains if not len(chain.elements) and chain.section is not None]
+def _rigid_weight(
+    scene: Scene, unloaded: Equilibrium, density: float | None, gravity: np.ndarray
+) -> list[DeadForces]:
+    """The weight of pieces that don't bend, which are of the stiffest material, at their
+    middles."""
+    rigid = [
+        (chain, chain.section)
+        for chain in scene.chains
+        if not len(chain.elements) and chain.section is not None
+    ]
     if not rigid:
         return []
     if density is None:
-        raise InputError("self-weight needs the density of every material", field="material.density")
+        raise InputError(
+            "self-weight needs the density of every material", field="material.density"
+        )
     x, arms = scene.node_poses(unloaded.state)[0], scene.node_arms(unloaded.state)[0]
-    mass = [density * section.area * np.linalg.norm(x[chain.nodes[-1]] - x[chain.nodes[0]]) for chain, section in rigid]
-    return [DeadForces([scene.node_body[chain.nodes[0]] for chain, _ in rigid], np.outer(mass, gravity),
-                       [arms[chain.nodes[[0, -1]]].mean(axis=0) for chain, _ in rigid])]
+    mass = [
+        density * section.area * np.linalg.norm(x[chain.nodes[-1]] - x[chain.nodes[0]])
+        for chain, section in rigid
+    ]
+    return [
+        DeadForces(
+            [scene.node_body[chain.nodes[0]] for chain, _ in rigid],
+            np.outer(mass, gravity),
+            [arms[chain.nodes[[0, -1]]].mean(axis=0) for chain, _ in rigid],
+        )
+    ]
 
 
 def _total_force(scene: Scene, unloaded: Equilibrium) -> np.ndarray:

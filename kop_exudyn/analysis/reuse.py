@@ -1,13 +1,17 @@
-"""How much designs share: kit size, Jaccard indices of their pieces, sets of designs that share nothing.
+"""How much designs share: kit size, Jaccard indices of their pieces, sets of designs that share
+nothing.
 
-Pieces of a design: how many of each part it is built of, a multiset. The kit needs as many of each part as the design
-that uses most of it: then any one design can be built at a time, and taken apart for the next.
+Pieces of a design: how many of each part it is built of, a multiset. The kit needs as many of each
+part as the design that uses most of it: then any one design can be built at a time, and taken apart
+for the next.
 """
+
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,7 +22,8 @@ Pieces = Mapping[str, Sequence[int]]  # kind -> (m,) count of each part in one d
 
 @dataclass(frozen=True)
 class SubsetReuse:
-    """The reuse of some of the designs: their numbers, and the generalised Jaccard index of their pieces in [0, 1]."""
+    """The reuse of some of the designs: their numbers, and the generalised Jaccard index of their
+    pieces in [0, 1]."""
 
     designs: tuple[int, ...]
     reuse: float
@@ -27,7 +32,9 @@ class SubsetReuse:
 def counts_of(designs: Sequence[Pieces], kind: str | None = None) -> np.ndarray:
     """(n_designs, n_parts) pieces as one table, of one kind or of all (in alphabetical order)."""
     kinds = sorted(designs[0]) if kind is None else [kind]
-    return np.array([np.concatenate([np.asarray(pieces[k], dtype=int) for k in kinds]) for pieces in designs])
+    return np.array(
+        [np.concatenate([np.asarray(pieces[k], dtype=int) for k in kinds]) for pieces in designs]
+    )
 
 
 def fabricated(counts: np.ndarray) -> int:
@@ -36,14 +43,17 @@ def fabricated(counts: np.ndarray) -> int:
 
 
 def kit_size_percent(counts: np.ndarray) -> float:
-    """Fabricated pieces over the elements of all designs, %; 100 / n_designs at best, 100 when nothing is shared."""
+    """Fabricated pieces over the elements of all designs, %; 100 / n_designs at best, 100 when
+    nothing is shared."""
     return 100 * fabricated(counts) / int(counts.sum())
 
 
 def reuse(counts: np.ndarray) -> float:
-    """Pieces that all of these designs use over pieces that any of them uses: |A n B ...| / |A u B ...|, multisets.
+    """Pieces that all of these designs use over pieces that any of them uses: |A n B ...| / |A u B
+    ...|, multisets.
 
-    For two designs that is their Jaccard index (Jaccard, "The distribution of the flora in the Alpine zone", 1912).
+    For two designs that is their Jaccard index (Jaccard, "The distribution of the flora in the
+    Alpine zone", 1912).
     """
     return float(np.min(counts, axis=0).sum() / fabricated(counts))
 
@@ -60,8 +70,11 @@ def jaccard_matrix(counts: np.ndarray) -> np.ndarray:
 def subset_reuse(counts: np.ndarray) -> list[SubsetReuse]:
     """The reuse of every set of two or more designs, smaller sets first (2^n - n - 1 in all)."""
     n = len(counts)
-    return [SubsetReuse(members, reuse(counts[list(members)]))
-            for size in range(2, n + 1) for members in combinations(range(n), size)]
+    return [
+        SubsetReuse(members, reuse(counts[list(members)]))
+        for size in range(2, n + 1)
+        for members in combinations(range(n), size)
+    ]
 
 
 def average_reuse(counts: np.ndarray) -> float:
@@ -71,12 +84,20 @@ def average_reuse(counts: np.ndarray) -> float:
 
 
 def disconnected(counts: np.ndarray) -> list[tuple[int, ...]]:
-    """Sets of designs of which no two share a part: connected components of the graph of designs and parts."""
+    """Sets of designs of which no two share a part: connected components of the graph of designs
+    and parts."""
     n = len(counts)
-    graph = sp.block_array([[sp.csr_array((n, n)), sp.csr_array(counts > 0, dtype=float)],
-                            [sp.csr_array(counts.T > 0, dtype=float), None]], format="csr")
+    graph = sp.block_array(
+        [
+            [sp.csr_array((n, n)), sp.csr_array(counts > 0, dtype=float)],
+            [sp.csr_array(counts.T > 0, dtype=float), None],
+        ],
+        format="csr",
+    )
     labels = connected_components(graph, directed=False)[1][:n]
-    return [tuple(np.flatnonzero(labels == label).tolist()) for label in dict.fromkeys(labels.tolist())]
+    return [
+        tuple(np.flatnonzero(labels == label).tolist()) for label in dict.fromkeys(labels.tolist())
+    ]
 
 
 def part_users(counts: np.ndarray) -> np.ndarray:
@@ -88,8 +109,11 @@ def reuse_figures(designs: Sequence[Pieces]) -> dict[str, Any]:
     """All of this for one kit, as plain data."""
     counts = counts_of(designs)
     return {
-        "pieces": fabricated(counts), "elements": int(counts.sum()), "kit_size_percent": kit_size_percent(counts),
-        "jaccard": jaccard_matrix(counts).tolist(), "average_reuse": average_reuse(counts),
+        "pieces": fabricated(counts),
+        "elements": int(counts.sum()),
+        "kit_size_percent": kit_size_percent(counts),
+        "jaccard": jaccard_matrix(counts).tolist(),
+        "average_reuse": average_reuse(counts),
         "by_kind": {kind: average_reuse(counts_of(designs, kind)) for kind in sorted(designs[0])},
         "subsets": [{"designs": list(s.designs), "reuse": s.reuse} for s in subset_reuse(counts)],
         "groups": [list(group) for group in disconnected(counts)],

@@ -1,4 +1,5 @@
 """One design simulated: its final state, confirmed by Exudyn, and how well it fits its target."""
+
 from __future__ import annotations
 
 import logging
@@ -12,23 +13,25 @@ from ..equilibrium.exudyn_model import Confirmation, ExudynModel
 from ..equilibrium.newton import Equilibrium, refine
 from ..equilibrium.warm_up import warm_up
 from ..errors import SimulationFailure
-from ..optimize.fitting import FitResult, TargetFitting
 from ..structures.base import Design
-from ..structures.load_case import LoadCase
+from ..structures.fitting import FitResult, TargetFitting
+from ..structures.loads import LoadCase
+from ..structures.strength import strength_summary
 from .loading import LoadedState, loaded_state
-from .strength import strength_summary
 
 log = logging.getLogger(__name__)
 
 _FAR_AWAY = 10.0  # % of the target's box diagonal
 _SLID = 5.0  # times the deviation: what isn't on the surface any more needs no such warning
 
+
 @dataclass(frozen=True)
 class SimulationResult:
     """The final state of one design.
 
     unknowns, elements : of the final state's scene
-    newton_iterations, wall_s : of all solves from the input to that state, seconds without compilation
+    newton_iterations, wall_s : of all solves from the input to that state, seconds without
+        compilation
     equilibria, confirmations : by role; the states are Exudyn's
     fit : of the deployed joints to the target
     joints : (n, 3) positions
@@ -53,23 +56,31 @@ class SimulationResult:
 
     @property
     def displaced_percent(self) -> float:
-        """Largest distance of a joint from its own place in the target, % of the target's bounding-box diagonal.
+        """Largest distance of a joint from its own place in the target, % of the target's
+        bounding-box diagonal.
 
-        Deviations are distances from the surface: a grid that shears, or closes, may slide along it.
+        Deviations are distances from the surface: a grid that shears, or closes, may slide along
+        it.
         """
         return 100 * float(self.fit.displacements.max()) / self.fit.diagonal
 
     def to_dict(self) -> dict[str, Any]:
         """As `kop simulate --json` prints it.
 
-        Besides figures named as the attributes: "strength", by state the largest equivalent stress, its share of the
-        elastic limit and the rod element where that is; "loaded", under loads, see `LoadedState.to_dict`.
+        Besides figures named as the attributes: "strength", by state the largest equivalent stress,
+        its share of the elastic limit and the rod element where that is; "loaded", under loads, see
+        `LoadedState.to_dict`.
         """
         final = self.deployed
         return {
-            "design": self.design.name, "unknowns": self.unknowns, "elements": self.elements,
-            "newton_iterations": self.newton_iterations, "wall_s": self.wall_s,
-            "elastic_energy": final.elastic_energy, "stable": final.stable, "opening_angle": final.opening,
+            "design": self.design.name,
+            "unknowns": self.unknowns,
+            "elements": self.elements,
+            "newton_iterations": self.newton_iterations,
+            "wall_s": self.wall_s,
+            "elastic_energy": final.elastic_energy,
+            "stable": final.stable,
+            "opening_angle": final.opening,
             "exudyn": self.confirmations[self.design.fitted_role.name].to_dict(),
             "fit": {"max_percent": self.fit.max_percent, "mean_percent": self.fit.mean_percent},
             "displaced_percent": self.displaced_percent,
@@ -82,9 +93,9 @@ class SimulationResult:
 def simulate(design: Design, loads: LoadCase | None = None) -> SimulationResult:
     """Deploy a design and have Exudyn confirm its states, the one under loads included.
 
-    loads : default: the design's own
-    Raises SimulationFailure when a state isn't found, is unstable, or isn't confirmed, InputError for loads that the
-    design can't have (see `loaded_state`).
+    loads : default: the design's own Raises SimulationFailure when a state isn't found, is
+    unstable, or isn't confirmed, InputError for loads that the design can't have (see
+    `loaded_state`).
     """
     loads = design.loads if loads is None else loads
     warm_up()
@@ -105,9 +116,23 @@ def simulate(design: Design, loads: LoadCase | None = None) -> SimulationResult:
     system = design.systems[role]
     loaded = None if loads.empty else loaded_state(design, equilibria[role], loads)
     result = SimulationResult(
-        design, system.n_unknowns, len(system.scene.elements), sum(eq.iterations for eq in equilibria.values()), wall_s,
-        equilibria, confirmations, fit, joints, loaded)
+        design,
+        system.n_unknowns,
+        len(system.scene.elements),
+        sum(eq.iterations for eq in equilibria.values()),
+        wall_s,
+        equilibria,
+        confirmations,
+        fit,
+        joints,
+        loaded,
+    )
     if result.displaced_percent > max(_FAR_AWAY, _SLID * fit.max_percent):
-        log.warning("%s: on the surface, but joints end up to %.3g %% of its box diagonal away from their places: the "
-                    "structure hardly resists that motion", design.name, result.displaced_percent)
+        log.warning(
+            "%s: on the surface, but joints end up to %.3g %% of its box diagonal away from their "
+            "places: the "
+            "structure hardly resists that motion",
+            design.name,
+            result.displaced_percent,
+        )
     return result

@@ -1,22 +1,26 @@
-"""Fabrication errors: how far a design moves when its elements aren't exactly as long, or as angled, as planned.
+"""Fabrication errors: how far a design moves when its elements aren't exactly as long, or as
+angled, as planned.
 
-To first order the joints' displacement is J dq with J = dx/dq, seen after the best rigid placement (an error that only
-turns the whole design is none). Independent errors of standard deviation s_k then give joints of covariance
-P J diag(s^2) J^T P^T, with P the projection off infinitesimal rigid motions. Sampling solves the equilibria instead.
+To first order the joints' displacement is J dq with J = dx/dq, seen after the best rigid placement
+(an error that only turns the whole design is none). Independent errors of standard deviation s_k
+then give joints of covariance P J diag(s^2) J^T P^T, with P the projection off infinitesimal rigid
+motions. Sampling solves the equilibria instead.
 """
+
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from ..equilibrium.sensitivities import Sensitivities
 from ..errors import InputError, SimulationFailure
 from ..kit.kinds import part_kind
-from ..optimize.fitting import best_placement
-from ..optimize.objective import DesignObjective, Evaluation
+from ..search.objective import DesignObjective, Evaluation
 from ..structures.base import Design
+from ..structures.fitting import best_placement
 from .buckling import snapped
 
 _STEPS_BACK = 3  # to the planned elements, which are near
@@ -36,7 +40,9 @@ class Tolerance:
     def __post_init__(self) -> None:
         for name in ("length", "angle"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
-                raise InputError("must be a number that is not negative", field=name, value=getattr(self, name))
+                raise InputError(
+                    "must be a number that is not negative", field=name, value=getattr(self, name)
+                )
 
     def scaled(self, factor: float) -> Tolerance:
         return Tolerance(factor * self.length, factor * self.angle)
@@ -73,9 +79,11 @@ class Spread:
 
 @dataclass(frozen=True)
 class Sample:
-    """One set of errors, and what came of it: the joints' displacements (n, 3), or why no equilibrium was found.
+    """One set of errors, and what came of it: the joints' displacements (n, 3), or why no
+    equilibrium was found.
 
-    snapped : into another state, from which the design doesn't come back when the errors are taken away
+    snapped : into another state, from which the design doesn't come back when the errors are taken
+        away
     """
 
     errors: np.ndarray
@@ -86,7 +94,8 @@ class Sample:
 
 
 def joint_jacobian(design: Design, evaluation: Evaluation) -> np.ndarray:
-    """(3n, nq) derivative of the fitted state's joints in the parameters, rigid motions taken out."""
+    """(3n, nq) derivative of the fitted state's joints in the parameters, rigid motions taken
+    out."""
     role = design.fitted_role.name
     equilibrium = evaluation.equilibria[role]
     J = Sensitivities(design.systems[role], equilibrium).positions(design.joints)
@@ -97,12 +106,15 @@ def joint_jacobian(design: Design, evaluation: Evaluation) -> np.ndarray:
 def predicted_spread(design: Design, evaluation: Evaluation, tolerance: Tolerance) -> Spread:
     """The joints' displacements to first order: no equilibrium is solved."""
     rows = joint_jacobian(design, evaluation) * tolerance.deviations(design)
-    variance = np.sum(rows.reshape(-1, 3, rows.shape[1])**2, axis=(1, 2))
+    variance = np.sum(rows.reshape(-1, 3, rows.shape[1]) ** 2, axis=(1, 2))
     return Spread(np.sqrt(variance), evaluation.fit.diagonal)
 
 
-def shares_by_kind(design: Design, evaluation: Evaluation, tolerance: Tolerance) -> Mapping[str, float]:
-    """kind -> its share of the joints' mean square displacement, to first order; they sum to one."""
+def shares_by_kind(
+    design: Design, evaluation: Evaluation, tolerance: Tolerance
+) -> Mapping[str, float]:
+    """kind -> its share of the joints' mean square displacement, to first order; they sum to
+    one."""
     rows = joint_jacobian(design, evaluation) * tolerance.deviations(design)
     by_parameter = np.sum(rows**2, axis=0)
     total = by_parameter.sum()
@@ -113,9 +125,15 @@ def shares_by_kind(design: Design, evaluation: Evaluation, tolerance: Tolerance)
     return found
 
 
-def sample_spread(design: Design, evaluation: Evaluation, tolerance: Tolerance, number: int, seed: int = 0,
-                  ) -> list[Sample]:
-    """Re-solved equilibria for `number` sets of normally distributed errors; the same errors for the same seed.
+def sample_spread(
+    design: Design,
+    evaluation: Evaluation,
+    tolerance: Tolerance,
+    number: int,
+    seed: int = 0,
+) -> list[Sample]:
+    """Re-solved equilibria for `number` sets of normally distributed errors; the same errors for
+    the same seed.
 
     A set for which no equilibrium is found is a sample with its reason.
     """
@@ -132,49 +150,75 @@ def sample_spread(design: Design, evaluation: Evaluation, tolerance: Tolerance, 
             samples.append(Sample(errors, None, None, str(failure)))
             continue
         joints = found.equilibria[role].state.positions[design.joints]
-        moved = best_placement(joints, wanted, np.full(len(joints), 1 / len(joints))).apply(joints) - wanted
-        samples.append(Sample(errors, moved, found.fit.max_percent,
-                              snapped=snapped(objective, found, evaluation, _STEPS_BACK)))
+        moved = (
+            best_placement(joints, wanted, np.full(len(joints), 1 / len(joints))).apply(joints)
+            - wanted
+        )
+        samples.append(
+            Sample(
+                errors,
+                moved,
+                found.fit.max_percent,
+                snapped=snapped(objective, found, evaluation, _STEPS_BACK),
+            )
+        )
     return samples
 
 
 def sampled_spread(samples: Sequence[Sample], diagonal: float) -> Spread:
-    """Root mean square displacements over the samples that were found. Raises SimulationFailure when none was."""
+    """Root mean square displacements over the samples that were found. Raises SimulationFailure
+    when none was."""
     found = [sample.displacements for sample in samples if sample.displacements is not None]
     if not found:
         raise SimulationFailure("no equilibrium was found for any sample of fabrication errors")
     return Spread(np.sqrt(np.mean(np.sum(np.square(found), axis=2), axis=0)), diagonal)
 
 
-def predicted_displacements(design: Design, evaluation: Evaluation, samples: Sequence[Sample]) -> np.ndarray:
-    """(number, n, 3) first-order displacements for the samples' own errors: the sampling's noise is in both."""
+def predicted_displacements(
+    design: Design, evaluation: Evaluation, samples: Sequence[Sample]
+) -> np.ndarray:
+    """(number, n, 3) first-order displacements for the samples' own errors: the sampling's noise is
+    in both."""
     J = joint_jacobian(design, evaluation)
     return np.stack([(J @ sample.errors).reshape(-1, 3) for sample in samples])
 
 
 def _rigid_motions(x: np.ndarray) -> np.ndarray:
-    """(3n, r) orthonormal basis of the infinitesimal rigid motions of points (n, 3); collinear points have fewer."""
+    """(3n, r) orthonormal basis of the infinitesimal rigid motions of points (n, 3); collinear
+    points have fewer."""
     arms = x - x.mean(axis=0)
     size = np.abs(arms).max() or 1.0
-    columns = [np.tile(axis, (len(x), 1)) for axis in np.eye(3)] + [np.cross(axis, arms / size) for axis in np.eye(3)]
+    columns = [np.tile(axis, (len(x), 1)) for axis in np.eye(3)] + [
+        np.cross(axis, arms / size) for axis in np.eye(3)
+    ]
     u, s, _ = np.linalg.svd(np.stack([c.ravel() for c in columns], axis=1), full_matrices=False)
     return u[:, s > 1e-9 * s[0]]
 
 
 def relative_tolerance(design: Design, share: float, angle: float) -> Tolerance:
     """Lengths uncertain by a share of the design's median length, angles by so many rad."""
-    lengths = [design.parameters[group.indices].ravel() for group in design.groups if not part_kind(group.kind).angular]
+    lengths = [
+        design.parameters[group.indices].ravel()
+        for group in design.groups
+        if not part_kind(group.kind).angular
+    ]
     return Tolerance(share * float(np.median(np.concatenate(lengths))) if lengths else 0.0, angle)
 
 
-def robustness(design: Design, evaluation: Evaluation, tolerance: Tolerance, factors: Sequence[float], number: int,
-               seed: int = 0) -> dict[str, Any]:
+def robustness(
+    design: Design,
+    evaluation: Evaluation,
+    tolerance: Tolerance,
+    factors: Sequence[float],
+    number: int,
+    seed: int = 0,
+) -> dict[str, Any]:
     """What errors of several sizes do to a design, by sensitivities and by sampling; plain data.
 
-    factors : multiples of the tolerance; number : samples for each
-    Of each size: root mean square and worst joint's displacement, predicted and sampled; the fit's largest deviations;
-    how many samples failed, and how many snapped; `linear_error`, the part of the displacements that their own
-    prediction misses, of the samples that kept to the state.
+    factors : multiples of the tolerance; number : samples for each Of each size: root mean square
+    and worst joint's displacement, predicted and sampled; the fit's largest deviations; how many
+    samples failed, and how many snapped; `linear_error`, the part of the displacements that their
+    own prediction misses, of the samples that kept to the state.
     """
     sizes = []
     for factor in factors:
@@ -182,21 +226,38 @@ def robustness(design: Design, evaluation: Evaluation, tolerance: Tolerance, fac
         predicted = predicted_spread(design, evaluation, scaled)
         samples = sample_spread(design, evaluation, scaled, number, seed)
         found = [sample for sample in samples if sample.displacements is not None]
-        entry: dict[str, Any] = {"factor": factor, "predicted_rms_percent": predicted.rms_percent,
-                 "predicted_worst_percent": predicted.worst_percent, "samples": number, "failed": number - len(found),
-                 "snapped": sum(sample.snapped for sample in found)}
+        entry: dict[str, Any] = {
+            "factor": factor,
+            "predicted_rms_percent": predicted.rms_percent,
+            "predicted_worst_percent": predicted.worst_percent,
+            "samples": number,
+            "failed": number - len(found),
+            "snapped": sum(sample.snapped for sample in found),
+        }
         if found:
             sampled = sampled_spread(samples, evaluation.fit.diagonal)
-            entry |= {"sampled_rms_percent": sampled.rms_percent, "sampled_worst_percent": sampled.worst_percent,
-                      "max_percent": [sample.max_percent for sample in found]}
+            entry |= {
+                "sampled_rms_percent": sampled.rms_percent,
+                "sampled_worst_percent": sampled.worst_percent,
+                "max_percent": [sample.max_percent for sample in found],
+            }
         kept = [sample for sample in found if not sample.snapped]
         if kept:
-            moved = np.stack([sample.displacements for sample in kept if sample.displacements is not None])
+            moved = np.stack(
+                [sample.displacements for sample in kept if sample.displacements is not None]
+            )
             missed = np.linalg.norm(moved - predicted_displacements(design, evaluation, kept))
             entry["linear_error"] = float(missed / np.linalg.norm(moved))
         sizes.append(entry)
-    return {"design": design.name, "elements": design.n_elements, "length": tolerance.length, "angle": tolerance.angle,
-            "planned_max_percent": evaluation.fit.max_percent,
-            "shares": dict(shares_by_kind(design, evaluation, tolerance)),
-            "joints_percent": 100 * predicted_spread(design, evaluation, tolerance).joints / evaluation.fit.diagonal,
-            "sizes": sizes}
+    return {
+        "design": design.name,
+        "elements": design.n_elements,
+        "length": tolerance.length,
+        "angle": tolerance.angle,
+        "planned_max_percent": evaluation.fit.max_percent,
+        "shares": dict(shares_by_kind(design, evaluation, tolerance)),
+        "joints_percent": 100
+        * predicted_spread(design, evaluation, tolerance).joints
+        / evaluation.fit.diagonal,
+        "sizes": sizes,
+    }

@@ -1,18 +1,23 @@
 """Fidelity against the size of the kit: one row a kit, and the knee of the curve."""
+
 from __future__ import annotations
 
-from typing import Any, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from .reuse import counts_of, fabricated, kit_size_percent
 
 
-def tradeoff_row(parts: Mapping[str, int], found: Mapping[str, Any], seconds: float) -> dict[str, Any]:
+def tradeoff_row(
+    parts: Mapping[str, int], found: Mapping[str, Any], seconds: float
+) -> dict[str, Any]:
     """Figures of one kit, from what `find_kit` returned.
 
-    Deviations in % of the bounding-box diagonals: the largest of all designs, and the mean over designs of their means;
-    energy ratios: elastic energies relative to the input designs'. None where a design failed.
+    Deviations in % of the bounding-box diagonals: the largest of all designs, and the mean over
+    designs of their means; energy ratios: elastic energies relative to the input designs'. None
+    where a design failed.
     """
     counts = counts_of(found["pieces"])
     built = [design for design in found["designs"] if "failed" not in design]
@@ -20,27 +25,33 @@ def tradeoff_row(parts: Mapping[str, int], found: Mapping[str, Any], seconds: fl
     fits = [design["fit"] for design in built]
     ratios = [design["energy_ratio"] for design in built]
     return {
-        **dict(parts), "pieces": fabricated(counts), "kit size %": kit_size_percent(counts),
+        **dict(parts),
+        "pieces": fabricated(counts),
+        "kit size %": kit_size_percent(counts),
         "max %": max(fit["max_percent"] for fit in fits) if whole else None,
         "mean %": float(np.mean([fit["mean_percent"] for fit in fits])) if whole else None,
         "energy ratio": float(np.mean(ratios)) if whole else None,
         "largest energy ratio": max(ratios) if whole else None,
         "failed designs": len(found["designs"]) - len(built),
-        "J": found["objective"], "equilibria": found["equilibria"], "seconds": seconds,
+        "J": found["objective"],
+        "equilibria": found["equilibria"],
+        "seconds": seconds,
     }
 
 
 def envelope(values: Sequence[float | None]) -> np.ndarray:
-    """(n,) the smallest value so far: what is to be had with at most so many parts. None counts as infinite."""
+    """(n,) the smallest value so far: what is to be had with at most so many parts. None counts as
+    infinite."""
     return np.minimum.accumulate([np.inf if value is None else value for value in values])
 
 
 def knee(sizes: Sequence[float], values: Sequence[float | None]) -> int | None:
     """Number of the point at the knee of a falling curve: more parts gain little, fewer cost much.
 
-    The rule of Satopaa, Albrecht, Irwin and Raghavan, "Finding a 'kneedle' in a haystack" (ICDCS workshops 2011), for
-    few points without smoothing: with both axes scaled to [0, 1], the point of the `envelope` that is farthest below the
-    straight line from its first to its last. None where no point is below that line.
+    The rule of Satopaa, Albrecht, Irwin and Raghavan, "Finding a 'kneedle' in a haystack" (ICDCS
+    workshops 2011), for few points without smoothing: with both axes scaled to [0, 1], the point of
+    the `envelope` that is farthest below the straight line from its first to its last. None where
+    no point is below that line.
 
     sizes : (n,) rising; values : (n,), None where there is none
     """

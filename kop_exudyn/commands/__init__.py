@@ -1,8 +1,9 @@
-"""Subcommands of ``kop``, one module each: HELP, DESCRIPTION, EXAMPLES, `arguments(parser)` and `run(args) -> status`.
+"""Subcommands of ``kop``, one module each: HELP, DESCRIPTION, EXAMPLES, `arguments(parser)` and
+`run(args) -> status`.
 
-A command is added by adding its module to NAMES; a module whose name would be a keyword ends in an underscore. Modules
-import what they compute with inside `run`, so that ``kop --help`` stays quick. All take --json (see `output`), --quiet
-and --verbose.
+A command is added by adding its module to NAMES; a module whose name would be a keyword ends in an
+underscore. Modules import what they compute with inside `run`, so that ``kop --help`` stays quick.
+All take --json (see `output`), --quiet and --verbose.
 """
 
 NAMES = ("simulate", "optimize", "import", "view", "export", "completion")

@@ -1,4 +1,6 @@
-"""Colours on terminals, and only there: not in files and pipes, and not where NO_COLOR is set (no-color.org)."""
+"""Colours on terminals, and only there: not in files and pipes, and not where NO_COLOR is set
+(no-color.org)."""
+
 from __future__ import annotations
 
 import logging

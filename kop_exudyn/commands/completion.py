@@ -1,9 +1,10 @@
 """``kop completion``: a script that completes commands, options and files in a shell."""
+
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Iterator
 
 from .output import add_json, report
 
@@ -29,7 +30,11 @@ def run(args: argparse.Namespace) -> int:
         if action.type is Path:
             action.complete = shtab.FILE  # type: ignore[attr-defined]  # where shtab looks for it
     script = shtab.complete(args.parser, shell=args.shell)
-    report(args, {"shell": args.shell, "script": script}, script if script.endswith("\n") else script + "\n")
+    report(
+        args,
+        {"shell": args.shell, "script": script},
+        script if script.endswith("\n") else script + "\n",
+    )
     return 0
 
 

@@ -1,4 +1,5 @@
 """``kop export``: a finished kit as files for the workshop and for other programs."""
+
 from __future__ import annotations
 
 import argparse
@@ -8,10 +9,11 @@ from .output import add_json, report
 from .values import number_pair, positive_number
 
 HELP = "write cut lists, cut sheets, assembly plans and 3D files of a finished kit"
-DESCRIPTION = """Reads the folder that `kop optimize` wrote, and writes two folders: workshop (cut list, bills and
-assembly plans as CSV; labelled assembly drawings as SVG and PDF; cut sheets and corner templates at true scale as SVG,
-and DXF with the extra [fab]) and desk (the assigned designs' states as OBJ centre lines, PLY and GLB solids, VTU with
-strains, stresses and utilisation, and tables as CSV)."""
+DESCRIPTION = """Reads the folder that `kop optimize` wrote, and writes two folders: workshop (cut
+list, bills and assembly plans as CSV; labelled assembly drawings as SVG and PDF; cut sheets and
+corner templates at true scale as SVG, and DXF with the extra [fab]) and desk (the assigned designs'
+states as OBJ centre lines, PLY and GLB solids, VTU with strains, stresses and utilisation, and
+tables as CSV)."""
 EXAMPLES = """examples:
   kop export out/kit models/conformals --out out/files --unit m
   kop export out/kit study.toml --out out/files --unit m --sheet 2500,1250 --joint-hole 6
@@ -20,17 +22,37 @@ EXAMPLES = """examples:
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("result", type=Path, metavar="RESULT", help="folder of a finished run")
-    parser.add_argument("folder", type=Path, metavar="FOLDER|STUDY",
-                        help="folder of the designs that it was made from, or study file")
+    parser.add_argument(
+        "folder",
+        type=Path,
+        metavar="FOLDER|STUDY",
+        help="folder of the designs that it was made from, or study file",
+    )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write to")
-    parser.add_argument("--unit", required=True, choices=("mm", "cm", "m"), help="the designs' unit of length")
-    parser.add_argument("--only", choices=("workshop", "desk"), help="write one of the folders (default: both)")
-    parser.add_argument("--sheet", type=number_pair, metavar="WIDTH,HEIGHT", help="of the material, in mm (default: "
-                        "1000,600)")
-    parser.add_argument("--joint-hole", type=positive_number, metavar="MM", help="diameter of the holes at joints "
-                        "(default: 4)")
-    parser.add_argument("--bolt-hole", type=positive_number, metavar="MM", help="diameter of the holes of corner plates "
-                        "(default: 3)")
+    parser.add_argument(
+        "--unit", required=True, choices=("mm", "cm", "m"), help="the designs' unit of length"
+    )
+    parser.add_argument(
+        "--only", choices=("workshop", "desk"), help="write one of the folders (default: both)"
+    )
+    parser.add_argument(
+        "--sheet",
+        type=number_pair,
+        metavar="WIDTH,HEIGHT",
+        help="of the material, in mm (default: 1000,600)",
+    )
+    parser.add_argument(
+        "--joint-hole",
+        type=positive_number,
+        metavar="MM",
+        help="diameter of the holes at joints (default: 4)",
+    )
+    parser.add_argument(
+        "--bolt-hole",
+        type=positive_number,
+        metavar="MM",
+        help="diameter of the holes of corner plates (default: 3)",
+    )
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
     add_json(parser)
 
@@ -38,12 +60,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from importlib.util import find_spec
 
-    from ..io.export import export_desk, export_workshop
-    from ..io.pieces import parts_list_of
-    from ..io.designs import load_designs
+    from ..exchange.export import export_desk, export_workshop
+    from ..fabrication.assembly_drawing import save_assembly_drawings
+    from ..fabrication.pieces import parts_list_of
+    from ..fabrication.templates import CutOptions
+    from ..io.datasets import load_designs
     from ..io.saved_runs import load_run
-    from ..io.templates import CutOptions
-    from ..report.assembly_drawing import save_assembly_drawings
 
     given = {name: getattr(args, name) for name in ("sheet", "joint_hole", "bolt_hole")}
     options = CutOptions(**{name: value for name, value in given.items() if value is not None})
@@ -51,8 +73,14 @@ def run(args: argparse.Namespace) -> int:
     done: list[Path] = []
     if args.only != "desk":
         sheets = ["svg"] + (["dxf"] if find_spec("ezdxf") else [])
-        done += export_workshop(parts_list_of(result), args.out / "workshop", args.unit, options=options,
-                                formats=sheets, overwrite=args.overwrite)
+        done += export_workshop(
+            parts_list_of(result),
+            args.out / "workshop",
+            args.unit,
+            options=options,
+            formats=sheets,
+            overwrite=args.overwrite,
+        )
         done += save_assembly_drawings(result, args.out / "workshop", overwrite=args.overwrite)
     if args.only != "workshop":
         done += export_desk(result, args.out / "desk", overwrite=args.overwrite)

@@ -1,4 +1,5 @@
 """``kop optimize``: one kit of parts for the designs of a folder or a study file."""
+
 from __future__ import annotations
 
 import argparse
@@ -10,13 +11,14 @@ from .output import add_json, report
 from .values import design_selection, not_negative, part_counts, positive, term_weights
 
 HELP = "find one kit of parts for several designs"
-DESCRIPTION = """Finds one kit of parts from which all designs of a folder, or of a study file, can be built. DIR gets
-result.json, kit.json, the final states, figures and index.html, which shows them. Checkpoints are written on the way:
---resume goes on where a run was stopped, and gives the same result. Running the same job again replaces its
-results.
+DESCRIPTION = """Finds one kit of parts from which all designs of a folder, or of a study file, can
+be built. DIR gets result.json, kit.json, the final states, figures and index.html, which shows
+them. Checkpoints are written on the way: --resume goes on where a run was stopped, and gives the
+same result. Running the same job again replaces its results.
 
-A study file is TOML: format = "kop_exudyn/study", version = 1, designs (a list of files or folders), and, if wanted,
-the tables parts, weights and settings. Options given here come before what it says."""
+A study file is TOML: format = "kop_exudyn/study", version = 1, designs (a list of files or
+folders), and, if wanted, the tables parts, weights and settings. Options given here come before
+what it says."""
 EXAMPLES = """examples:
   kop optimize models/conformals --designs 3 --parts linear=12,angular=5 --out out/kit
   kop optimize models/conformals --designs 02_tanh,07_log --parts linear=8,angular=3 --out out/pair
@@ -26,32 +28,77 @@ EXAMPLES = """examples:
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=Path, metavar="FOLDER|STUDY",
-                        help="folder of design files, or a study file (.toml)")
-    parser.add_argument("--parts", type=part_counts, metavar="KIND=N,...",
-                        help="how many parts of each kind, as linear=12,angular=5 (default: what the study says)")
-    parser.add_argument("--kit", type=Path, metavar="FILE",
-                        help="build the designs from this kit (a kit.json), whose parts stay as they are")
-    parser.add_argument("--weights", type=term_weights, metavar="TERM=W,...",
-                        help="of the objective's terms, as energy=0.05,stress=0.1; share is that of the joints' own "
-                        "places in fit")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the results")
-    parser.add_argument("--designs", type=design_selection, metavar="N|NAMES",
-                        help="the first N designs, or names of files without .json (default: all)")
+    parser.add_argument(
+        "folder",
+        type=Path,
+        metavar="FOLDER|STUDY",
+        help="folder of design files, or a study file (.toml)",
+    )
+    parser.add_argument(
+        "--parts",
+        type=part_counts,
+        metavar="KIND=N,...",
+        help="how many parts of each kind, as linear=12,angular=5 (default: what the study says)",
+    )
+    parser.add_argument(
+        "--kit",
+        type=Path,
+        metavar="FILE",
+        help="build the designs from this kit (a kit.json), whose parts stay as they are",
+    )
+    parser.add_argument(
+        "--weights",
+        type=term_weights,
+        metavar="TERM=W,...",
+        help="of the objective's terms, as energy=0.05,stress=0.1; share is that of the joints' "
+        "own places in fit",
+    )
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="folder for the results"
+    )
+    parser.add_argument(
+        "--designs",
+        type=design_selection,
+        metavar="N|NAMES",
+        help="the first N designs, or names of files without .json (default: all)",
+    )
     parser.add_argument("--resume", action="store_true", help="go on from the checkpoints in DIR")
-    parser.add_argument("--overwrite", action="store_true", help="write to DIR even if it holds something else")
-    parser.add_argument("--jobs", type=positive, metavar="N",
-                        help="processes that solve designs (default: one a core); the result doesn't depend on it")
-    parser.add_argument("--seed", type=not_negative, metavar="N", help="of the clustering (default: 0)")
-    parser.add_argument("--max-steps", type=positive, metavar="N",
-                        help="accepted steps at most, in each round of either stage")
-    parser.add_argument("--leaps", type=not_negative, metavar="N",
-                        help="how often many elements get other parts at once, to leave a local minimum: more find "
-                        "better kits and take longer (default: 3)")
-    parser.add_argument("--redeployments", type=not_negative, metavar="N",
-                        help="how often the designs are then opened from their assembly and the second stage goes on "
-                        "from where they end, so that they open into their shape by themselves (default: 0)")
-    add_json(parser, "print JSON for other programs: the paths of page, result and kit, and how every design fits")
+    parser.add_argument(
+        "--overwrite", action="store_true", help="write to DIR even if it holds something else"
+    )
+    parser.add_argument(
+        "--jobs",
+        type=positive,
+        metavar="N",
+        help="processes that solve designs (default: one a core); the result doesn't depend on it",
+    )
+    parser.add_argument(
+        "--seed", type=not_negative, metavar="N", help="of the clustering (default: 0)"
+    )
+    parser.add_argument(
+        "--max-steps",
+        type=positive,
+        metavar="N",
+        help="accepted steps at most, in each round of either stage",
+    )
+    parser.add_argument(
+        "--leaps",
+        type=not_negative,
+        metavar="N",
+        help="how often many elements get other parts at once, to leave a local minimum: more find "
+        "better kits and take longer (default: 3)",
+    )
+    parser.add_argument(
+        "--redeployments",
+        type=not_negative,
+        metavar="N",
+        help="how often the designs are then opened from their assembly and the second stage goes "
+        "on from where they end, so that they open into their shape by themselves (default: 0)",
+    )
+    add_json(
+        parser,
+        "print JSON for other programs: the paths of page, result and kit, and how designs fit",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -60,29 +107,64 @@ def run(args: argparse.Namespace) -> int:
     from ..errors import InputError
     from ..io.kits import load_kit
     from ..io.studies import load_study
-    from ..optimize.objective import Weights
     from ..report.environment import usable_cores
     from ..report.kit_run import optimize_kit
+    from ..search.objective import Weights
 
     study = load_study(args.folder, args.designs)
     if args.kit is not None and args.parts:
-        raise InputError("a kit says how many parts there are: give --kit or --parts", field="--parts", value=args.parts)
+        raise InputError(
+            "a kit says how many parts there are: give --kit or --parts",
+            field="--parts",
+            value=args.parts,
+        )
     kit = None if args.kit is None else load_kit(args.kit)
-    parts = kit.sizes if kit is not None else {_singular(k): count for k, count in (args.parts or study.parts).items()}
+    parts = (
+        kit.sizes
+        if kit is not None
+        else {_singular(k): count for k, count in (args.parts or study.parts).items()}
+    )
     if not parts:
-        raise InputError("says nothing of the parts: --parts or --kit is required", source=args.folder)
+        raise InputError(
+            "says nothing of the parts: --parts or --kit is required", source=args.folder
+        )
     Weights.of(args.weights or {})  # names that aren't terms are found before anything is read
-    study = replace(study, settings=replace(study.settings, **_given(args)), weights={**study.weights, **(args.weights or {})})
+    study = replace(
+        study,
+        settings=replace(study.settings, **_given(args)),
+        weights={**study.weights, **(args.weights or {})},
+    )
     designs = study.designs()
-    result = optimize_kit(designs, parts, out=args.out, inputs=study.files, resume=args.resume,
-                          settings=study.job_settings(designs, args.jobs or usable_cores()), overwrite=args.overwrite,
-                          progress=not args.quiet, kit=kit)
-    failed = [design.name for n, design in enumerate(result.designs) if "failed" in result.summary("assigned", n)]
+    result = optimize_kit(
+        designs,
+        parts,
+        out=args.out,
+        inputs=study.files,
+        resume=args.resume,
+        settings=study.job_settings(designs, args.jobs or usable_cores()),
+        overwrite=args.overwrite,
+        progress=not args.quiet,
+        kit=kit,
+    )
+    failed = [
+        design.name
+        for n, design in enumerate(result.designs)
+        if "failed" in result.summary("assigned", n)
+    ]
     page = args.out / "index.html"
-    report(args, {
-        "page": page, "result": args.out / "result.json", "kit": args.out / "kit.json",
-        "designs": [{"name": design.name, **result.summary("assigned", n)} for n, design in enumerate(result.designs)],
-    }, f"{page}\n")
+    report(
+        args,
+        {
+            "page": page,
+            "result": args.out / "result.json",
+            "kit": args.out / "kit.json",
+            "designs": [
+                {"name": design.name, **result.summary("assigned", n)}
+                for n, design in enumerate(result.designs)
+            ],
+        },
+        f"{page}\n",
+    )
     if failed:
         sys.stderr.write(f"kop: these designs can't be built from the kit: {', '.join(failed)}\n")
     return 1 if failed else 0

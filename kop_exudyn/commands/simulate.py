@@ -1,4 +1,5 @@
 """``kop simulate``: one design, deployed."""
+
 from __future__ import annotations
 
 import argparse
@@ -9,9 +10,9 @@ from .output import add_json
 from .values import gravity
 
 HELP = "deploy one design and say how well it fits its target"
-DESCRIPTION = """Deploys a design, has Exudyn confirm the equilibrium, and reports its energy, its stability and
-how far its joints are from the target surface, and the largest stress in its rods. With loads, from the design file or
-by --gravity, also the deflection and the stress under them."""
+DESCRIPTION = """Deploys a design, has Exudyn confirm the equilibrium, and reports its energy, its
+stability and how far its joints are from the target surface, and the largest stress in its rods.
+With loads, from the design file or by --gravity, also the deflection and the stress under them."""
 EXAMPLES = """examples:
   kop simulate models/conformals/01_sinh.json
   kop simulate design.json --json > state.json
@@ -20,13 +21,24 @@ EXAMPLES = """examples:
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("design", type=Path, metavar="DESIGN", help="design file (.json or .json.gz)")
-    parser.add_argument("--gravity", nargs="?", type=gravity, const=gravity("9.81"), metavar="G",
-                        help="let the rods' weight act: an acceleration down the z axis (default: 9.81, for lengths in "
-                        "metres) or a vector X,Y,Z, in the design's units; instead of the design file's gravity. "
-                        "Materials need a density")
-    add_json(parser, "print JSON for other programs, joint positions included; of a simulation that fails, the design's "
-             "name and the reason")
+    parser.add_argument(
+        "design", type=Path, metavar="DESIGN", help="design file (.json or .json.gz)"
+    )
+    parser.add_argument(
+        "--gravity",
+        nargs="?",
+        type=gravity,
+        const=gravity("9.81"),
+        metavar="G",
+        help="let the rods' weight act: an acceleration down the z axis (default: 9.81, for "
+        "lengths in metres) or a vector X,Y,Z, in the design's units; instead of the design "
+        "file's gravity. Materials need a density",
+    )
+    add_json(
+        parser,
+        "print JSON for other programs, joint positions included; of a simulation that fails, "
+        "the design's name and the reason",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -36,8 +48,8 @@ def run(args: argparse.Namespace) -> int:
 
     from ..analysis.simulation import simulate
     from ..errors import SimulationFailure
+    from ..files.json_files import to_json
     from ..io.designs import load_design
-    from ..io.json_files import to_json
 
     design = load_design(args.design)
     own = () if args.gravity is None else (replace(design.loads, gravity=np.array(args.gravity)),)
@@ -57,12 +69,14 @@ def _summary(result: dict) -> str:
     rows = {
         "design": result["design"],
         "model": f"{result['elements']:,} elements, {result['unknowns']:,} unknowns",
-        "deviation": f"max {fit['max_percent']:.3g} %, mean {fit['mean_percent']:.3g} % of the target's box diagonal",
+        "deviation": f"max {fit['max_percent']:.3g} %, mean {fit['mean_percent']:.3g} % "
+        "of the target's box diagonal",
         "displacement": f"max {result['displaced_percent']:.3g} % from the joints' own places",
         "elastic energy": f"{result['elastic_energy']:.6g}",
         "stable": "yes" if result["stable"] else "no",
         "solved in": f"{result['wall_s']:.2f} s, {result['newton_iterations']} Newton iterations",
-        "Exudyn": f"{exudyn['version']}: {exudyn['newton_steps']} steps, moved by {exudyn['moved']:.1e} of its size",
+        "Exudyn": f"{exudyn['version']}: {exudyn['newton_steps']} steps, "
+        f"moved by {exudyn['moved']:.1e} of its size",
     }
     if result["opening_angle"] is not None:
         rows["opening angle"] = f"{result['opening_angle']:.4g} rad"
@@ -79,8 +93,9 @@ def _under_load(loaded: dict) -> dict[str, str]:
     force = ", ".join(f"{component:.4g}" for component in loaded["total_force"])
     return {
         "load": f"({force}) in all, held at {len(loaded['supports'])} joints",
-        "deflection": f"max {deflection['max']:.3g} ({deflection['max_percent']:.3g} % of the diagonal), "
-                      f"mean {deflection['mean']:.3g} ({deflection['mean_percent']:.3g} %)",
+        "deflection": f"max {deflection['max']:.3g} "
+        f"({deflection['max_percent']:.3g} % of the diagonal), "
+        f"mean {deflection['mean']:.3g} ({deflection['mean_percent']:.3g} %)",
         "stress, loaded": _stress(loaded["strength"]),
         "stable, loaded": "yes" if loaded["stable"] else "no",
     }
@@ -91,5 +106,9 @@ def _stress(strength: dict) -> str:
     if strength["equivalent_stress"] is None:
         return "unknown: the rods have no section"
     share = strength["utilisation"]
-    used = "" if share is None else f", {100 * share:.3g} % of the elastic limit{': it yields' if share > 1 else ''}"
+    used = (
+        ""
+        if share is None
+        else f", {100 * share:.3g} % of the elastic limit{': it yields' if share > 1 else ''}"
+    )
     return f"{strength['equivalent_stress']:.4g}{used}"

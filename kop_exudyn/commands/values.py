@@ -1,4 +1,5 @@
 """Values of command-line options, read with errors that say what is wrong with them."""
+
 from __future__ import annotations
 
 import argparse
@@ -6,13 +7,17 @@ import math
 
 
 def part_counts(text: str) -> dict[str, int]:
-    """``linear=12,angular=5`` as {"linear": 12, "angular": 5}; whether there are such kinds is checked later."""
-    return {kind: _whole(number, 1, f"the number of {kind} parts")
-            for kind, number in _assignments(text, "kind", "KIND=NUMBER,...").items()}
+    """``linear=12,angular=5`` as {"linear": 12, "angular": 5}; whether there are such kinds is
+    checked later."""
+    return {
+        kind: _whole(number, 1, f"the number of {kind} parts")
+        for kind, number in _assignments(text, "kind", "KIND=NUMBER,...").items()
+    }
 
 
 def term_weights(text: str) -> dict[str, float]:
-    """``fit=1e4,energy=0.05`` as {"fit": 1e4, "energy": 0.05}; whether there are such terms is checked later."""
+    """``fit=1e4,energy=0.05`` as {"fit": 1e4, "energy": 0.05}; whether there are such terms is
+    checked later."""
     weights = {}
     for name, number in _assignments(text, "term", "TERM=WEIGHT,...").items():
         value = _numbers(number, (1,))
@@ -29,7 +34,9 @@ def design_selection(text: str) -> int | list[str]:
     except ValueError:
         names = [name.strip() for name in text.split(",")]
         if not all(names):
-            raise argparse.ArgumentTypeError(f"expected a number or names of designs, got {text!r}") from None
+            raise argparse.ArgumentTypeError(
+                f"expected a number or names of designs, got {text!r}"
+            ) from None
         return names
     return _whole(str(number), 1, "the number of designs")
 
@@ -61,14 +68,16 @@ def number_pair(text: str) -> tuple[float, float]:
 
 
 def held_joints(text: str) -> str | list[int]:
-    """``0,4,20`` as [0, 4, 20], a word as it is; which words and joints there are is checked later."""
+    """``0,4,20`` as [0, 4, 20], a word as it is; which words and joints there are is checked
+    later."""
     if text.isidentifier():
         return text
     return [_whole(number.strip(), 0, "the number of a joint") for number in text.split(",")]
 
 
 def patch(text: str) -> tuple[str, list[int]]:
-    """``parallelogram,4,5`` as ("parallelogram", [4, 5]); which shapes there are is checked later."""
+    """``parallelogram,4,5`` as ("parallelogram", [4, 5]); which shapes there are is checked
+    later."""
     shape, *counts = (piece.strip() for piece in text.split(","))
     if not shape or not counts:
         raise argparse.ArgumentTypeError(f"expected SHAPE,N or SHAPE,M,N, got {text!r}")
@@ -106,7 +115,8 @@ def _assignments(text: str, what: str, form: str) -> dict[str, str]:
 
 
 def _numbers(text: str, counts: tuple[int, ...]) -> list[float]:
-    """Finite numbers between commas; none where their count isn't one of these, or the text is something else."""
+    """Finite numbers between commas; none where their count isn't one of these, or the text is
+    something else."""
     try:
         values = [float(piece) for piece in text.split(",")]
     except ValueError:
@@ -120,5 +130,7 @@ def _whole(text: str, least: int, what: str) -> int:
     except ValueError:
         number = None
     if number is None or number < least:
-        raise argparse.ArgumentTypeError(f"{what} must be a whole number, at least {least}, got {text!r}")
+        raise argparse.ArgumentTypeError(
+            f"{what} must be a whole number, at least {least}, got {text!r}"
+        )
     return number

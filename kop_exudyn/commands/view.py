@@ -1,4 +1,5 @@
 """``kop view``: a finished kit, or one design deployed, as a page to turn around."""
+
 from __future__ import annotations
 
 import argparse
@@ -13,29 +14,46 @@ if TYPE_CHECKING:
     from ..report.viewer import ViewerScene
 
 HELP = "write a page that shows a finished kit, or a deployed design, in 3D"
-DESCRIPTION = """Writes one self-contained HTML page with an orbitable 3D view; it needs no network. Of a result (the
-folder that `kop optimize` wrote, with the folder of its designs): all designs in all stages, rods with their true
-sections, coloured by part, deviation or utilisation, and where each part is used. Of a design file: that design,
-deployed. Both with the target surface and a slider for the opening."""
+DESCRIPTION = """Writes one self-contained HTML page with an orbitable 3D view; it needs no network.
+Of a result (the folder that `kop optimize` wrote, with the folder of its designs): all designs in
+all stages, rods with their true sections, coloured by part, deviation or utilisation, and where
+each part is used. Of a design file: that design, deployed. Both with the target surface and a
+slider for the opening."""
 EXAMPLES = """examples:
   kop view out/kit models/conformals --out kit.html
   kop view models/conformals/03_exp.json --out exp.html"""
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("what", type=Path, metavar="RESULT|DESIGN",
-                        help="folder of a finished run, or a design file (.json or .json.gz)")
-    parser.add_argument("folder", type=Path, nargs="?", metavar="FOLDER|STUDY",
-                        help="of a result: the folder of the designs that it was made from, or the study file")
-    parser.add_argument("--out", type=Path, required=True, metavar="PAGE", help="page to write (.html)")
-    parser.add_argument("--frames", type=not_negative, default=8, metavar="N",
-                        help="states to solve for on the way to the opening (default: 8)")
+    parser.add_argument(
+        "what",
+        type=Path,
+        metavar="RESULT|DESIGN",
+        help="folder of a finished run, or a design file (.json or .json.gz)",
+    )
+    parser.add_argument(
+        "folder",
+        type=Path,
+        nargs="?",
+        metavar="FOLDER|STUDY",
+        help="of a result: the folder of the designs that it was made from, or the study file",
+    )
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="PAGE", help="page to write (.html)"
+    )
+    parser.add_argument(
+        "--frames",
+        type=not_negative,
+        default=8,
+        metavar="N",
+        help="states to solve for on the way to the opening (default: 8)",
+    )
     parser.add_argument("--overwrite", action="store_true", help="replace the page if it exists")
     add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    from ..io.files import check_output_file
+    from ..files.files import check_output_file
     from ..report.viewer import save_viewer
 
     check_output_file(args.out, overwrite=args.overwrite)
@@ -47,13 +65,16 @@ def run(args: argparse.Namespace) -> int:
 
 def _kit(args: argparse.Namespace) -> ViewerScene:
     from ..errors import InputError
-    from ..io.designs import load_designs
+    from ..io.datasets import load_designs
     from ..io.saved_runs import load_run
     from ..report.viewer_scenes import kit_scene
 
     if args.folder is None:
-        raise InputError("of a result, give also the folder of the designs that it was made from", source=args.what,
-                         field="FOLDER")
+        raise InputError(
+            "of a result, give also the folder of the designs that it was made from",
+            source=args.what,
+            field="FOLDER",
+        )
     return kit_scene(load_run(args.what, load_designs(args.folder)), frames=args.frames)
 
 
@@ -64,7 +85,10 @@ def _design(args: argparse.Namespace) -> ViewerScene:
     from ..report.viewer_scenes import design_scene
 
     if args.folder is not None:
-        raise InputError("expected the folder of a finished run in front of a folder of designs", source=args.what,
-                         field="RESULT")
+        raise InputError(
+            "expected the folder of a finished run in front of a folder of designs",
+            source=args.what,
+            field="RESULT",
+        )
     result = simulate(load_design(args.what))
     return design_scene(result.design, result.equilibria, frames=args.frames)

@@ -1,10 +1,13 @@
-"""Many sparse right-hand sides solved together with one sparse L D L^T: what sensitivities spend their time on.
+"""Many sparse right-hand sides solved together with one sparse L D L^T: what sensitivities spend
+their time on.
 
-Columns of L with the same pattern (a body's six unknowns) are taken as one panel, so that a row of the work block that
-is loaded once serves six columns; what is left over, hinge angles mostly, goes column by column. Right-hand sides go
-through in blocks that stay in the second-level cache, and the forward pass leaves out panels that no right-hand side of
-a block has reached (Gilbert and Peierls 1988).
+Columns of L with the same pattern (a body's six unknowns) are taken as one panel, so that a row of
+the work block that is loaded once serves six columns; what is left over, hinge angles mostly, goes
+column by column. Right-hand sides go through in blocks that stay in the second-level cache, and the
+forward pass leaves out panels that no right-hand side of a block has reached (Gilbert and Peierls
+1988).
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -19,7 +22,8 @@ _BLOCK = 88  # right-hand sides of a block
 
 @nb.njit(cache=True)
 def panels_of(indptr: np.ndarray, indices: np.ndarray) -> np.ndarray:
-    """First columns (n_panels + 1,) of the panels of L: runs of columns with one pattern below them."""
+    """First columns (n_panels + 1,) of the panels of L: runs of columns with one pattern below
+    them."""
     n = len(indptr) - 1
     starts = np.empty(n + 1, np.int64)
     count, width = 0, _PANEL
@@ -36,7 +40,8 @@ def panels_of(indptr: np.ndarray, indices: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Solutions:
-    """Solutions (n, count) as the solver leaves them: to copy them into one array would take a quarter of its time.
+    """Solutions (n, count) as the solver leaves them: to copy them into one array would take a
+    quarter of its time.
 
     blocks : (n_blocks, n, _BLOCK) some columns a block, rows in the order of the elimination
     place : (n,) where each row is in a block
@@ -61,14 +66,19 @@ class Solutions:
 
 
 def solve_columns(
-    L: sp.csc_matrix, pivots: np.ndarray, order: np.ndarray, panels: np.ndarray, rhs: sp.csc_matrix,
-    constraint: np.ndarray | None = None, column: np.ndarray | None = None,
+    L: sp.csc_matrix,
+    pivots: np.ndarray,
+    order: np.ndarray,
+    panels: np.ndarray,
+    rhs: sp.csc_matrix,
+    constraint: np.ndarray | None = None,
+    column: np.ndarray | None = None,
 ) -> Solutions:
-    """A^-1 rhs with A = P L D L^T P^T and rhs sparse (n, k); with a constraint c (n,) and `column` = A^-1 c (n,),
-    the solutions d of A d + c t = rhs, c.d = 0.
+    """A^-1 rhs with A = P L D L^T P^T and rhs sparse (n, k); with a constraint c (n,) and `column`
+    = A^-1 c (n,), the solutions d of A d + c t = rhs, c.d = 0.
 
-    Every t comes from the solution that it corrects: where A is nearly singular, what rounding leaves of its softest
-    mode in a solution is then taken out of it again.
+    Every t comes from the solution that it corrects: where A is nearly singular, what rounding
+    leaves of its softest mode in a solution is then taken out of it again.
     """
     n, k = rhs.shape
     place = np.empty(n, np.int64)
@@ -79,21 +89,48 @@ def solve_columns(
     else:
         constrained = np.flatnonzero(constraint)
         shares = constraint[constrained] / (constraint @ column)
-    _solve_blocks(panels, L.indptr, L.indices, L.data, 1 / pivots, place, rhs.indptr, rhs.indices, rhs.data,
-                  constrained, shares, column, blocks)
+    _solve_blocks(
+        panels,
+        L.indptr,
+        L.indices,
+        L.data,
+        1 / pivots,
+        place,
+        rhs.indptr,
+        rhs.indices,
+        rhs.data,
+        constrained,
+        shares,
+        column,
+        blocks,
+    )
     return Solutions(blocks, place, k)
 
 
 @nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _solve_blocks(panels, indptr, indices, data, inverse, place, rhs_ptr, rhs_rows, rhs_values, constrained, shares,
-                  column, blocks):
-    """Blocks of right-hand sides, one after the other: scatter, forward, backward, and what the constraint asks for."""
+def _solve_blocks(
+    panels,
+    indptr,
+    indices,
+    data,
+    inverse,
+    place,
+    rhs_ptr,
+    rhs_rows,
+    rhs_values,
+    constrained,
+    shares,
+    column,
+    blocks,
+):
+    """Blocks of right-hand sides, one after the other: scatter, forward, backward, and what the
+    constraint asks for."""
     n, total = len(place), len(rhs_ptr) - 1
     panel, multiplier = np.empty(_PANEL * _BLOCK), np.empty(_BLOCK)
     reached = np.empty(len(panels), np.bool_)
     panel_of = np.empty(n, np.int64)
     for s in range(len(panels) - 1):
-        panel_of[panels[s]: panels[s + 1]] = s
+        panel_of[panels[s] : panels[s + 1]] = s
     for b in range(len(blocks)):
         work, first = blocks[b], b * _BLOCK
         work[:] = 0.0
@@ -131,7 +168,8 @@ def _solve_blocks(panels, indptr, indices, data, inverse, place, rhs_ptr, rhs_ro
 
 @nb.njit(cache=True, error_model="numpy")
 def _multiply(indptr, places, data, blocks, out):
-    """out (m, k) += a sparse matrix (m, n), its columns as places in the blocks, times the solutions."""
+    """out (m, k) += a sparse matrix (m, n), its columns as places in the blocks, times the
+    solutions."""
     for b in range(len(blocks)):
         first = b * _BLOCK
         k = min(_BLOCK, out.shape[1] - first)
@@ -157,7 +195,8 @@ def _gather(blocks, places, out):
 
 @nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _forward_columns(first, end, indptr, indices, data, work):
-    """Take what each solved row contributes from all rows below, one column of L after the other."""
+    """Take what each solved row contributes from all rows below, one column of L after the
+    other."""
     for q in range(first, end):
         own = work[q]
         for t in range(indptr[q], indptr[q + 1]):
@@ -168,7 +207,8 @@ def _forward_columns(first, end, indptr, indices, data, work):
 
 @nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _backward_columns(first, end, indptr, indices, data, inverse, work):
-    """Divide rows by their pivots and take what the solved rows below contribute, one column of L after the other."""
+    """Divide rows by their pivots and take what the solved rows below contribute, one column of L
+    after the other."""
     for q in range(end - 1, first - 1, -1):
         own, pivot = work[q], inverse[q]
         for c in range(_BLOCK):
@@ -182,26 +222,55 @@ def _backward_columns(first, end, indptr, indices, data, inverse, work):
 @nb.njit(cache=True, error_model="numpy", inline="always")
 def _within(first, indptr, data):
     """L's entries within a panel, column by column."""
-    a, b, c, d, e = indptr[first], indptr[first + 1], indptr[first + 2], indptr[first + 3], indptr[first + 4]
-    return (data[a], data[a + 1], data[a + 2], data[a + 3], data[a + 4], data[b], data[b + 1], data[b + 2], data[b + 3],
-            data[c], data[c + 1], data[c + 2], data[d], data[d + 1], data[e])
+    a, b, c, d, e = (
+        indptr[first],
+        indptr[first + 1],
+        indptr[first + 2],
+        indptr[first + 3],
+        indptr[first + 4],
+    )
+    return (
+        data[a],
+        data[a + 1],
+        data[a + 2],
+        data[a + 3],
+        data[a + 4],
+        data[b],
+        data[b + 1],
+        data[b + 2],
+        data[b + 3],
+        data[c],
+        data[c + 1],
+        data[c + 2],
+        data[d],
+        data[d + 1],
+        data[e],
+    )
 
 
 @nb.njit(cache=True, error_model="numpy", inline="always")
 def _below(first, indptr):
     """Where each of the panel's columns has its first entry below the panel."""
-    return (indptr[first] + 5, indptr[first + 1] + 4, indptr[first + 2] + 3, indptr[first + 3] + 2,
-            indptr[first + 4] + 1, indptr[first + 5])
+    return (
+        indptr[first] + 5,
+        indptr[first + 1] + 4,
+        indptr[first + 2] + 3,
+        indptr[first + 3] + 2,
+        indptr[first + 4] + 1,
+        indptr[first + 5],
+    )
 
 
 @nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _forward_panel(first, indptr, indices, data, work, panel):
     """Solve within a panel, then take its six columns from all rows below."""
     for q in range(_PANEL):
-        row, own = work[first + q], panel[q * _BLOCK: (q + 1) * _BLOCK]
+        row, own = work[first + q], panel[q * _BLOCK : (q + 1) * _BLOCK]
         for c in range(_BLOCK):
             own[c] = row[c]
-    l10, l20, l30, l40, l50, l21, l31, l41, l51, l32, l42, l52, l43, l53, l54 = _within(first, indptr, data)
+    l10, l20, l30, l40, l50, l21, l31, l41, l51, l32, l42, l52, l43, l53, l54 = _within(
+        first, indptr, data
+    )
     for c in range(_BLOCK):
         x0 = panel[c]
         x1 = panel[_BLOCK + c] - l10 * x0
@@ -212,23 +281,36 @@ def _forward_panel(first, indptr, indices, data, work, panel):
         panel[_BLOCK + c], panel[2 * _BLOCK + c], panel[3 * _BLOCK + c] = x1, x2, x3
         panel[4 * _BLOCK + c], panel[5 * _BLOCK + c] = x4, x5
     for q in range(1, _PANEL):
-        row, own = work[first + q], panel[q * _BLOCK: (q + 1) * _BLOCK]
+        row, own = work[first + q], panel[q * _BLOCK : (q + 1) * _BLOCK]
         for c in range(_BLOCK):
             row[c] = own[c]
     a0, a1, a2, a3, a4, a5 = _below(first, indptr)
     for t in range(indptr[first + _PANEL] - a5):
         row = work[indices[a5 + t]]
-        v0, v1, v2, v3, v4, v5 = data[a0 + t], data[a1 + t], data[a2 + t], data[a3 + t], data[a4 + t], data[a5 + t]
+        v0, v1, v2, v3, v4, v5 = (
+            data[a0 + t],
+            data[a1 + t],
+            data[a2 + t],
+            data[a3 + t],
+            data[a4 + t],
+            data[a5 + t],
+        )
         for c in range(_BLOCK):
-            row[c] -= (v0 * panel[c] + v1 * panel[_BLOCK + c] + v2 * panel[2 * _BLOCK + c]
-                       + v3 * panel[3 * _BLOCK + c] + v4 * panel[4 * _BLOCK + c] + v5 * panel[5 * _BLOCK + c])
+            row[c] -= (
+                v0 * panel[c]
+                + v1 * panel[_BLOCK + c]
+                + v2 * panel[2 * _BLOCK + c]
+                + v3 * panel[3 * _BLOCK + c]
+                + v4 * panel[4 * _BLOCK + c]
+                + v5 * panel[5 * _BLOCK + c]
+            )
 
 
 @nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _backward_panel(first, indptr, indices, data, inverse, work, panel):
     """Divide a panel by its pivots, take all rows below from it, then solve within it."""
     for q in range(_PANEL):
-        row, own, pivot = work[first + q], panel[q * _BLOCK: (q + 1) * _BLOCK], inverse[first + q]
+        row, own, pivot = work[first + q], panel[q * _BLOCK : (q + 1) * _BLOCK], inverse[first + q]
         for c in range(_BLOCK):
             own[c] = pivot * row[c]
     a0, a1, a2, a3, a4, a5 = _below(first, indptr)
@@ -253,7 +335,14 @@ def _backward_panel(first, indptr, indices, data, inverse, work, panel):
             panel[5 * _BLOCK + c] -= v50 * r0 + v51 * r1 + v52 * r2 + v53 * r3
     for t in range(m - m % 4, m):
         row = work[indices[a5 + t]]
-        v0, v1, v2, v3, v4, v5 = data[a0 + t], data[a1 + t], data[a2 + t], data[a3 + t], data[a4 + t], data[a5 + t]
+        v0, v1, v2, v3, v4, v5 = (
+            data[a0 + t],
+            data[a1 + t],
+            data[a2 + t],
+            data[a3 + t],
+            data[a4 + t],
+            data[a5 + t],
+        )
         for c in range(_BLOCK):
             r = row[c]
             panel[c] -= v0 * r
@@ -262,7 +351,9 @@ def _backward_panel(first, indptr, indices, data, inverse, work, panel):
             panel[3 * _BLOCK + c] -= v3 * r
             panel[4 * _BLOCK + c] -= v4 * r
             panel[5 * _BLOCK + c] -= v5 * r
-    l10, l20, l30, l40, l50, l21, l31, l41, l51, l32, l42, l52, l43, l53, l54 = _within(first, indptr, data)
+    l10, l20, l30, l40, l50, l21, l31, l41, l51, l32, l42, l52, l43, l53, l54 = _within(
+        first, indptr, data
+    )
     for c in range(_BLOCK):
         x5 = panel[5 * _BLOCK + c]
         x4 = panel[4 * _BLOCK + c] - l54 * x5
@@ -273,6 +364,6 @@ def _backward_panel(first, indptr, indices, data, inverse, work, panel):
         panel[c], panel[_BLOCK + c], panel[2 * _BLOCK + c] = x0, x1, x2
         panel[3 * _BLOCK + c], panel[4 * _BLOCK + c] = x3, x4
     for q in range(_PANEL):
-        row, own = work[first + q], panel[q * _BLOCK: (q + 1) * _BLOCK]
+        row, own = work[first + q], panel[q * _BLOCK : (q + 1) * _BLOCK]
         for c in range(_BLOCK):
             row[c] = own[c]

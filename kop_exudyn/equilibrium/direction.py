@@ -1,4 +1,6 @@
-"""Newton directions of a scene with or without the mean-angle equation, convexified where they have to be."""
+"""Newton directions of a scene with or without the mean-angle equation, convexified where they have
+to be."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -8,10 +10,12 @@ import numpy as np
 from ..errors import SimulationFailure
 from .system import System
 
-_SHIFT_START = 1e-6  # of the median rotational stiffness; a soft mode of a large structure is about that soft
+# of the median rotational stiffness; a soft mode of a large structure is about that soft
+_SHIFT_START = 1e-6
 _SHIFT_GROWTH = 8.0
-# Just enough of a shift leaves the softest mode so soft that the step overshoots along it: released umbrella meshes
-# then take 60 to 80 iterations, with the margin 25 to 50. Flat starts of actuated scenes have to leave along that mode.
+# Just enough of a shift leaves the softest mode so soft that the step overshoots along it: released
+# umbrella meshes then take 60 to 80 iterations, with the margin 25 to 50. Flat starts of actuated
+# scenes have to leave along that mode.
 _SHIFT_MARGIN = 4.0
 _MAX_SHIFTS = 40
 
@@ -25,10 +29,12 @@ class Border:
 
 
 def factorise_convex(system: System, shift: float = 0.0) -> tuple[float, Border | None]:
-    """Factorise K + shift M with a shift that makes it positive definite on the constraint's kernel.
+    """Factorise K + shift M with a shift that makes it positive definite on the constraint's
+    kernel.
 
-    The given shift is kept if it does, otherwise the smallest one tried that does is taken, times a margin in scenes
-    without actuation. Returns the shift that was used and the border (None without actuation).
+    The given shift is kept if it does, otherwise the smallest one tried that does is taken, times a
+    margin in scenes without actuation. Returns the shift that was used and the border (None without
+    actuation).
     """
     base = None
     for _ in range(_MAX_SHIFTS):
@@ -64,8 +70,9 @@ def border_of(system: System) -> Border | None:
 def is_convex(negative: int, border: Border | None) -> bool:
     """Whether K is positive definite on the constraint's kernel, given its non-positive pivots.
 
-    The bordered matrix [[K, c], [c^T, 0]] has the inertia of K plus the sign of -c.K^-1 c; K is positive definite on
-    the kernel of c exactly when the bordered matrix has one negative eigenvalue (Haynsworth; Gould 1985).
+    The bordered matrix [[K, c], [c^T, 0]] has the inertia of K plus the sign of -c.K^-1 c; K is
+    positive definite on the kernel of c exactly when the bordered matrix has one negative
+    eigenvalue (Haynsworth; Gould 1985).
     """
     if border is None:
         return negative == 0
@@ -75,7 +82,8 @@ def is_convex(negative: int, border: Border | None) -> bool:
 def bordered_solve(
     system: System, border: Border | None, rhs: np.ndarray, gap: float | np.ndarray = 0.0
 ) -> tuple[np.ndarray, np.ndarray | float]:
-    """Solve K d + c t = rhs, c.d = gap; rhs (n,) or (n, k), gap scalar or (k,). Returns d and t (0 without border)."""
+    """Solve K d + c t = rhs, c.d = gap; rhs (n,) or (n, k), gap scalar or (k,). Returns d and t (0
+    without border)."""
     d = system.solve(rhs)
     if border is None:
         return d, 0.0

@@ -1,9 +1,11 @@
-"""How a scene is laid out for Exudyn: which nodes it needs, who carries whom, where each rod lies unstressed.
+"""How a scene is laid out for Exudyn: which nodes it needs, who carries whom, where each rod lies
+unstressed.
 
-Exudyn's beam takes its stress-free shape from the nodes' reference coordinates. So connected pieces are laid out along
-a spanning tree, each element's nodes one rest length (and rest curvature) apart; where an element would close a loop,
-its end gets a node of its own, tied rigidly to the other one.
+Exudyn's beam takes its stress-free shape from the nodes' reference coordinates. So connected pieces
+are laid out along a spanning tree, each element's nodes one rest length (and rest curvature) apart;
+where an element would close a loop, its end gets a node of its own, tied rigidly to the other one.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -17,11 +19,13 @@ from ..scene.scene import Scene
 
 @dataclass(frozen=True)
 class Carrier:
-    """The item that represents one frame: a body (hinge -1), or what turns with one of its hinges, at its centre.
+    """The item that represents one frame: a body (hinge -1), or what turns with one of its hinges,
+    at its centre.
 
     node : Exudyn node
     frame (3, 3) : the node's axes in the frame's axes
-    rigid : whether the node belongs to an added rigid body (needed where rods or hinges sit off the frame's origin)
+    rigid : whether the node belongs to an added rigid body (needed where rods or hinges sit off the
+        frame's origin)
     """
 
     body: int
@@ -39,7 +43,8 @@ class Layout:
     element_nodes (E, 2) : Exudyn nodes of every element
     scene_node (n_nodes,) : the scene node that each one represents, -1 for added rigid bodies
     carriers : by (body, hinge)
-    ties : (carrier key, node, frame (3, 3), offset (3,)) rigid attachments of further nodes to a frame
+    ties : (carrier key, node, frame (3, 3), offset (3,)) rigid attachments of further nodes to a
+        frame
     levels : elements in spanning order, those of one array independent of each other
     """
 
@@ -54,7 +59,9 @@ class Layout:
     def carrier_arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """All carriers: bodies, hinges (-1: the body itself), nodes (n,) and frames (n, 3, 3)."""
         items = list(self.carriers.values())
-        bodies, hinges, nodes = np.array([(c.body, c.hinge, c.node) for c in items], int).reshape(-1, 3).T
+        bodies, hinges, nodes = (
+            np.array([(c.body, c.hinge, c.node) for c in items], int).reshape(-1, 3).T
+        )
         return bodies, hinges, nodes, np.array([c.frame for c in items]).reshape(-1, 3, 3)
 
     def reference_coordinates(self, scene: Scene, lengths: np.ndarray) -> np.ndarray:
@@ -77,46 +84,71 @@ def layout_of(scene: Scene) -> Layout:
     levels, element_nodes = _span(element_nodes, len(unique), scene_node)
     frames: dict[tuple[int, int], list[int]] = {}
     for node, origin in enumerate(scene_node):
-        frames.setdefault((int(scene.node_body[origin]), int(scene.node_hinge[origin])), []).append(node)
+        frames.setdefault((int(scene.node_body[origin]), int(scene.node_hinge[origin])), []).append(
+            node
+        )
     for body in range(scene.n_bodies):
         frames.setdefault((body, -1), [])
     carriers, ties = {}, []
-    eccentric = {int(scene.node_body[n]) for n in np.flatnonzero(scene.node_hinge >= 0)
-                 if scene.hinge_centre[scene.node_hinge[n]].any()}
+    eccentric = {
+        int(scene.node_body[n])
+        for n in np.flatnonzero(scene.node_hinge >= 0)
+        if scene.hinge_centre[scene.node_hinge[n]].any()
+    }
     count = len(scene_node)
     for key, nodes in sorted(frames.items()):
         origins = [scene_node[n] for n in nodes]
         centred = [n for n, o in zip(nodes, origins) if not scene.node_offset[o].any()]
-        plain = all(not scene.node_offset[o].any() for o in origins) and not (key[1] < 0 and key[0] in eccentric)
+        plain = all(not scene.node_offset[o].any() for o in origins) and not (
+            key[1] < 0 and key[0] in eccentric
+        )
         if centred and plain:
-            carriers[key] = Carrier(*key, centred[0], scene.node_frame[scene_node[centred[0]]], False)
+            carriers[key] = Carrier(
+                *key, centred[0], scene.node_frame[scene_node[centred[0]]], False
+            )
         else:
             carriers[key] = Carrier(*key, count, np.eye(3), True)
             count += 1
-        ties += [(key, n, scene.node_frame[o], scene.node_offset[o])
-                 for n, o in zip(nodes, origins) if n != carriers[key].node]
+        ties += [
+            (key, n, scene.node_frame[o], scene.node_offset[o])
+            for n, o in zip(nodes, origins)
+            if n != carriers[key].node
+        ]
     added = count - len(scene_node)
     return Layout(count, element_nodes, np.array(scene_node + [-1] * added), carriers, ties, levels)
 
 
 def _merge_coincident(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Scene nodes with the same body, hinge, frame and offset are one Exudyn node; those without rods are left out.
+    """Scene nodes with the same body, hinge, frame and offset are one Exudyn node; those without
+    rods are left out.
 
-    Returns one scene node (m,) of each Exudyn node, and the Exudyn node (N,) of every scene node (-1: none).
+    Returns one scene node (m,) of each Exudyn node, and the Exudyn node (N,) of every scene node
+    (-1: none).
     """
     used = np.unique(scene.elements)
-    table = np.concatenate([scene.node_body[:, None], scene.node_hinge[:, None],
-                            scene.node_frame.reshape(-1, 9), scene.node_offset], axis=1)
+    table = np.concatenate(
+        [
+            scene.node_body[:, None],
+            scene.node_hinge[:, None],
+            scene.node_frame.reshape(-1, 9),
+            scene.node_offset,
+        ],
+        axis=1,
+    )
     _, first, inverse = np.unique(table[used], axis=0, return_index=True, return_inverse=True)
     node_of = np.full(len(table), -1)
     node_of[used] = inverse.ravel()
     return used[first], node_of
 
 
-def _span(element_nodes: np.ndarray, n_nodes: int, scene_node: list[int]) -> tuple[list[np.ndarray], np.ndarray]:
-    """Order the elements along a forest, tail before head; returns levels and the (changed) element nodes.
+def _span(
+    element_nodes: np.ndarray, n_nodes: int, scene_node: list[int]
+) -> tuple[list[np.ndarray], np.ndarray]:
+    """Order the elements along a forest, tail before head; returns levels and the (changed) element
+    nodes.
 
-    A node that is already some element's head, or that would close a loop, is doubled: appended to scene_node.
+    A node that is already some element's head, or that would close a loop, is doubled: appended to
+    scene_node.
     """
     element_nodes = element_nodes.copy()
     parent = list(range(n_nodes))

@@ -1,4 +1,5 @@
 """Sparse LDL^T by QDLDL: symbolic analysis once a topology, then numeric refactorisations."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -21,7 +22,8 @@ class Factorisation:
         self.pivots = np.empty(0)
 
     def update(self, upper: sp.csc_matrix) -> int:
-        """Factorise (upper triangle, all diagonal entries present); returns the number of non-positive pivots."""
+        """Factorise (upper triangle, all diagonal entries present); returns the number of
+        non-positive pivots."""
         try:
             if self._solver is None:
                 self._solver = qdldl.Solver(upper, upper=True)
@@ -45,12 +47,18 @@ class Factorisation:
         assert self._solver is not None
         if rhs.ndim == 1:
             return self._solver.solve(rhs)
-        return np.stack([self._solver.solve(np.ascontiguousarray(column)) for column in rhs.T], axis=1)
+        return np.stack(
+            [self._solver.solve(np.ascontiguousarray(column)) for column in rhs.T], axis=1
+        )
 
     def solve_columns(
-        self, rhs: sp.csc_matrix, constraint: np.ndarray | None = None, column: np.ndarray | None = None
+        self,
+        rhs: sp.csc_matrix,
+        constraint: np.ndarray | None = None,
+        column: np.ndarray | None = None,
     ) -> Solutions:
-        """Solve for many sparse right-hand sides (n, k), bordered by a constraint (n,) if its column is given too."""
+        """Solve for many sparse right-hand sides (n, k), bordered by a constraint (n,) if its
+        column is given too."""
         assert self._factors is not None
         L, pivots, order = self._factors
         if self._panels is None:

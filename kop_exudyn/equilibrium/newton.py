@@ -1,13 +1,16 @@
 """Static equilibria by Newton's method with independently predicted stresses.
 
-Plain Newton on slender rods crawls along the valley of the stretch-stiff energy. Here the geometric stiffness is taken
-at the stress that the last step predicted, sigma <- (K/L)(e + B d), while the gradient stays exact: the mixed-stress
-iteration of slender-shell continuation (Magisano, Leonetti, Garcea, CMAME 2017). Safeguards: a cap on rotations a
-step, a shift wherever a pivot is not positive, a watchdog that returns to the best state when several steps bring
-nothing, and after that a fall-back to energy descent with line search. A converged state that the pivots show to be
-unstable is left along its softest mode, as is one that the iteration creeps up to: a saddle is never returned. Cold
-starts that bring nothing are tried once more by way of axially soft rods (softened.py).
+Plain Newton on slender rods crawls along the valley of the stretch-stiff energy. Here the geometric
+stiffness is taken at the stress that the last step predicted, sigma <- (K/L)(e + B d), while the
+gradient stays exact: the mixed-stress iteration of slender-shell continuation (Magisano, Leonetti,
+Garcea, CMAME 2017). Safeguards: a cap on rotations a step, a shift wherever a pivot is not
+positive, a watchdog that returns to the best state when several steps bring nothing, and after that
+a fall-back to energy descent with line search. A converged state that the pivots show to be
+unstable is left along its softest mode, as is one that the iteration creeps up to: a saddle is
+never returned. Cold starts that bring nothing are tried once more by way of axially soft rods
+(softened.py).
 """
+
 from __future__ import annotations
 
 import logging
@@ -29,7 +32,8 @@ _QUICK = 2  # headway within so many further steps: the steps may grow again
 _MAX_RETURNS = 8  # to the best state, before energy descent takes over
 _FLOOR_FACTOR = 30.0
 _BENT_TOO_FAR = 2.5  # rad from one end of an element to the other; at pi its strain measure ends
-# Shifted steps in a row, and the relative residual, after which an iteration is taken to be creeping up to a saddle.
+# Shifted steps in a row, and the relative residual, after which an iteration is taken to be
+# creeping up to a saddle.
 _LINGERING, _NEAR = 20, 1e-2
 
 
@@ -37,16 +41,19 @@ _LINGERING, _NEAR = 20, 1e-2
 class NewtonOptions:
     """Settings of the equilibrium solver.
 
-    tolerance : largest residual force, relative to the largest internal force (round-off is allowed for)
+    tolerance : largest residual force, relative to the largest internal force (round-off is allowed
+        for)
     max_iterations : over all phases of one solve
     rotation_cap : rad, largest rotation or hinge turn of one step
     mixed : predicted-stress iteration; False gives plain Newton with line search
-    patience : mixed iterations without headway before the best state returns and steps become shorter
+    patience : mixed iterations without headway before the best state returns and steps become
+        shorter
     escapes : how many saddles are left before the solve is given up
     escape_rotation : rad, largest rotation of the first move away from a saddle
-    soften : when a start without stress (one that no earlier solve led to) brings nothing, solve with rods that are
-        soft along their axis first (see softened.py)
-    side : (n_free,) vector; where the two ways off a saddle are equivalent, the one with positive product is taken
+    soften : when a start without stress (one that no earlier solve led to) brings nothing, solve
+        with rods that are soft along their axis first (see softened.py)
+    side : (n_free,) vector; where the two ways off a saddle are equivalent, the one with positive
+        product is taken
     """
 
     tolerance: float = 1e-9
@@ -66,8 +73,9 @@ class Start:
 
     state : poses and angles
     torque : the actuation's multiplier
-    stress : (E, 6) generalised stresses for the first geometric stiffness, default none: after a jump in lengths the
-        start's own stresses are spurious compressions that would make the stiffness indefinite
+    stress : (E, 6) generalised stresses for the first geometric stiffness, default none: after a
+        jump in lengths the start's own stresses are spurious compressions that would make the
+        stiffness indefinite
     """
 
     state: State
@@ -82,8 +90,8 @@ class Equilibrium:
     state : poses and angles
     q : (n_parameters,) parameters that it belongs to
     opening : prescribed mean actuated angle, or None
-    torque : the actuation's multiplier, energy / rad (0 without actuation): the torque on every actuated hinge is
-        torque / number of actuated hinges
+    torque : the actuation's multiplier, energy / rad (0 without actuation): the torque on every
+        actuated hinge is torque / number of actuated hinges
     stress : (E, 6) generalised stresses (N, Q_y, Q_z, M_t, M_y, M_z) in the elements
     elastic_energy, potential : energies
     iterations : Newton iterations of the solve, all phases
@@ -111,24 +119,34 @@ class Equilibrium:
         return Start(self.state, self.torque, self.stress)
 
     def after(self, *earlier: Equilibrium) -> Equilibrium:
-        """The same equilibrium, with the iterations and seconds of the solves that led to it added."""
-        return replace(self, iterations=self.iterations + sum(eq.iterations for eq in earlier),
-                       escapes=self.escapes + sum(eq.escapes for eq in earlier),
-                       wall_s=self.wall_s + sum(eq.wall_s for eq in earlier))
+        """The same equilibrium, with the iterations and seconds of the solves that led to it
+        added."""
+        return replace(
+            self,
+            iterations=self.iterations + sum(eq.iterations for eq in earlier),
+            escapes=self.escapes + sum(eq.escapes for eq in earlier),
+            wall_s=self.wall_s + sum(eq.wall_s for eq in earlier),
+        )
 
 
 def solve(
-    system: System, q: np.ndarray, start: Start | Equilibrium | State | None = None, opening: float | None = None,
+    system: System,
+    q: np.ndarray,
+    start: Start | Equilibrium | State | None = None,
+    opening: float | None = None,
     options: NewtonOptions = NewtonOptions(),
 ) -> Equilibrium:
     """Find the stable equilibrium that the iteration reaches from a start.
 
     Parameters
     ----------
-    system : the scene's workspace; afterwards it holds the assembled and factorised Hessian of the solution
+    system : the scene's workspace; afterwards it holds the assembled and factorised Hessian of the
+        solution
     q : (n_parameters,) parameters
-    start : what to start from (default: the scene's initial state, unstressed); driven unknowns are set from q
-    opening : rad, mean angle of the actuated hinges (must be given exactly when the scene is actuated)
+    start : what to start from (default: the scene's initial state, unstressed); driven unknowns are
+        set from q
+    opening : rad, mean angle of the actuated hinges (must be given exactly when the scene is
+        actuated)
 
     Raises
     ------
@@ -158,12 +176,15 @@ def _solve_softened_first(
 ) -> Equilibrium:
     """The equilibrium that is reached by way of that of the softened scene."""
     softer = solve(System(softened(system.scene, q)), q, start, opening, options)
-    return _Run(system, q, Start(softer.state, softer.torque), opening, options).solve().after(softer)
+    return (
+        _Run(system, q, Start(softer.state, softer.torque), opening, options).solve().after(softer)
+    )
 
 
 @dataclass
 class _Best:
-    """The best state of a mixed phase, with the stress of its geometric stiffness and what the next step promises."""
+    """The best state of a mixed phase, with the stress of its geometric stiffness and what the next
+    step promises."""
 
     state: State
     torque: float
@@ -177,7 +198,14 @@ class _Best:
 class _Run:
     """One solve: the iterate and the safeguards' memory."""
 
-    def __init__(self, system: System, q: np.ndarray, start: Start, opening: float | None, options: NewtonOptions):
+    def __init__(
+        self,
+        system: System,
+        q: np.ndarray,
+        start: Start,
+        opening: float | None,
+        options: NewtonOptions,
+    ):
         self.system, self.q, self.opening, self.options = system, q, opening, options
         self.state = system.scene.with_driven(start.state, q)
         self.torque = start.torque
@@ -185,11 +213,14 @@ class _Run:
         self.iterations = 0
         self.escapes = 0
         self.shift = 0.0
-        self.assembled: Energy | None = None  # if the Hessian of the state itself is in the system already
+        # if the Hessian of the state itself is in the system already
+        self.assembled: Energy | None = None
 
     def solve(self) -> Equilibrium:
         begin = perf_counter()
-        converged = self._mixed() if self.options.mixed else self._descend(self.options.max_iterations)
+        converged = (
+            self._mixed() if self.options.mixed else self._descend(self.options.max_iterations)
+        )
         while True:
             while not converged:
                 self.assembled = None
@@ -211,23 +242,35 @@ class _Run:
             self.assembled = None
             self._leave_saddle(energy)
             # on the second saddle in a row the quick iteration leads back: descend all the way
-            converged = self._mixed() if self.options.mixed and self.escapes == 1 else self._descend(60)
-        # taken at a predicted stress, however close, the factors aren't those that another process would make of the state
+            converged = (
+                self._mixed() if self.options.mixed and self.escapes == 1 else self._descend(60)
+            )
+        # taken at a predicted stress, however close, the factors aren't those that another process
+        # would make of the state
         self.system.factorised_at = self.state if self.assembled is None else None
         return Equilibrium(
-            state=self.state, q=np.array(self.q, float), opening=self.opening,
-            torque=self.torque, stress=self.system.stress(), elastic_energy=energy.elastic, potential=energy.potential,
-            iterations=self.iterations, residual=self.relative(residual), escapes=self.escapes,
+            state=self.state,
+            q=np.array(self.q, float),
+            opening=self.opening,
+            torque=self.torque,
+            stress=self.system.stress(),
+            elastic_energy=energy.elastic,
+            potential=energy.potential,
+            iterations=self.iterations,
+            residual=self.relative(residual),
+            escapes=self.escapes,
             wall_s=perf_counter() - begin,
         )
 
-    # -- phases ----------------------------------------------------------------------------------------------------
+    # -- phases --------------------------------------------------------------------------------
     def _mixed(self) -> bool:
-        """Mixed-stress iterations until they converge or stop making headway; the best state is kept then.
+        """Mixed-stress iterations until they converge or stop making headway; the best state is
+        kept then.
 
-        Single steps may raise energy and residual: the stretch that they cause is undone by the next ones. So headway
-        is asked for only within `patience` steps (Grippo, Lampariello, Lucidi's watchdog). Without it the best state
-        returns, and the steps from there are shorter and, by a shift, stiffer in the soft directions.
+        Single steps may raise energy and residual: the stretch that they cause is undone by the
+        next ones. So headway is asked for only within `patience` steps (Grippo, Lampariello,
+        Lucidi's watchdog). Without it the best state returns, and the steps from there are shorter
+        and, by a shift, stiffer in the soft directions.
         """
         system, options = self.system, self.options
         best: _Best | None = None
@@ -243,7 +286,9 @@ class _Run:
             if np.isfinite(value) and (best is None or self._headway(best, value, merit)):
                 if since <= _QUICK:
                     cap, floor = min(options.rotation_cap, 2 * cap), floor / _FLOOR_FACTOR
-                best = _Best(self.state, self.torque, system.predicted_stress.copy(), value, merit, abs(gap))
+                best = _Best(
+                    self.state, self.torque, system.predicted_stress.copy(), value, merit, abs(gap)
+                )
                 since = 0
             else:
                 since += counted
@@ -261,12 +306,14 @@ class _Run:
             self.shift, border = factorise_convex(system, max(floor, self.shift / 16))
             shifted = shifted + 1 if self.shift > floor else 0
             if shifted > _LINGERING and self.relative(residual) < _NEAR and self._unstable_here():
-                # symmetry keeps the residual off the unstable mode, whose shift makes the other modes converge slowly
+                # symmetry keeps the residual off the unstable mode, whose shift makes the other
+                # modes converge slowly
                 best, since, shifted = None, 0, 0
                 continue
             step, change = bordered_solve(system, border, -residual, -gap)
             scale = self._capped(step, cap)
-            # without a potential nothing tells whether a shortened step leads ahead: a roll-up needs many of them
+            # without a potential nothing tells whether a shortened step leads ahead: a roll-up
+            # needs many of them
             counted = scale == 1.0 or system.conservative
             if since == 0:
                 best.slope = scale * float(residual @ step)
@@ -285,7 +332,8 @@ class _Run:
         return self.system.conservative and value < best.value - 1e-3 * abs(best.slope)
 
     def _descend(self, limit: int) -> bool:
-        """Newton on the energy with shift and Armijo line search; at most `limit` accepted steps."""
+        """Newton on the energy with shift and Armijo line search; at most `limit` accepted
+        steps."""
         system = self.system
         self._close_gap()
         energy = system.assemble(self.state)
@@ -294,14 +342,19 @@ class _Run:
             residual, gap = self.residual()
             shift, border = factorise_convex(system, shift)
             if border is not None:
-                # the multiplier that fits the energy's gradient best: after the gap is closed only it is unknown
-                self.torque = -float(system.gradient[: system.n_unknowns] @ border.column) / border.schur
+                # the multiplier that fits the energy's gradient best: after the gap is closed only
+                # it is unknown
+                self.torque = (
+                    -float(system.gradient[: system.n_unknowns] @ border.column) / border.schur
+                )
                 residual, gap = self.residual()
             if self._converged(residual, gap):
                 return True
             self._check_budget()
             step, _ = bordered_solve(system, border, -residual, -gap)
-            scale = self._line_search(step, self._capped(step, self.options.rotation_cap), float(residual @ step), energy)
+            scale = self._line_search(
+                step, self._capped(step, self.options.rotation_cap), float(residual @ step), energy
+            )
             if scale == 0.0:
                 if shift == 0.0:
                     return self._merit(residual, gap) < 1.0
@@ -315,7 +368,8 @@ class _Run:
         return self._converged(*self.residual())
 
     def _line_search(self, step: np.ndarray, scale: float, slope: float, energy: Energy) -> float:
-        """Backtracking on the potential (on the residual where no potential exists); 0 when nothing was gained."""
+        """Backtracking on the potential (on the residual where no potential exists); 0 when nothing
+        was gained."""
         system = self.system
         floor = 1e-14 * abs(energy.potential)
         while scale > 1e-8:
@@ -329,7 +383,8 @@ class _Run:
         return 0.0
 
     def _unstable_here(self) -> bool:
-        """Whether the stiffness at the state itself is indefinite; the state is then left along its softest mode."""
+        """Whether the stiffness at the state itself is indefinite; the state is then left along its
+        softest mode."""
         energy = self.system.assemble(self.state)
         if is_convex(self.system.factorise(), border_of(self.system)):
             return False
@@ -346,7 +401,12 @@ class _Run:
         softest = softest_mode(self.system)
         mode = softest.vector
         side = self.options.side
-        if side is not None and side @ mode < 0 or side is None and mode[np.argmax(np.abs(mode))] < 0:
+        if (
+            side is not None
+            and side @ mode < 0
+            or side is None
+            and mode[np.argmax(np.abs(mode))] < 0
+        ):
             mode = -mode
         mode = mode * (self.options.escape_rotation / np.abs(mode[self.system.is_rotation]).max())
         ahead, gain = self._lowest_along(mode, energy.potential)
@@ -355,8 +415,11 @@ class _Run:
             back, other = self._lowest_along(-mode, energy.potential)
             ahead, gain = (back, other) if other < 1.1 * gain or gain >= 0.0 else (ahead, gain)
         if gain >= 0.0:
-            raise SimulationFailure("a neutral equilibrium (a mechanism, or a bifurcation point): no lower energy along "
-                                    f"its softest mode, of eigenvalue {softest.eigenvalue:.2g}")
+            raise SimulationFailure(
+                "a neutral equilibrium (a mechanism, or a bifurcation point): no lower energy "
+                "along "
+                f"its softest mode, of eigenvalue {softest.eigenvalue:.2g}"
+            )
         self.state = ahead
         system = self.system
         system.assemble(ahead)
@@ -364,7 +427,8 @@ class _Run:
         log.debug("left a saddle: energy change %.3g", gain)
 
     def _lowest_along(self, mode: np.ndarray, potential: float) -> tuple[State, float]:
-        """The lowest state on a ray of doubling steps, and its potential's change (not negative: none was lower)."""
+        """The lowest state on a ray of doubling steps, and its potential's change (not negative:
+        none was lower)."""
         best, change, scale = self.state, 0.0, 1.0
         for _ in range(8):
             state = self.state.moved(self.system.increment(scale * mode))
@@ -377,9 +441,10 @@ class _Run:
                 scale /= 8
         return best, change
 
-    # -- measures --------------------------------------------------------------------------------------------------
+    # -- measures ------------------------------------------------------------------------------
     def residual(self) -> tuple[np.ndarray, float]:
-        """Residual (n_free,) of the state assembled last, and how far its mean angle is from the opening."""
+        """Residual (n_free,) of the state assembled last, and how far its mean angle is from the
+        opening."""
         system = self.system
         residual = system.gradient[: system.n_unknowns]
         if system.constraint is None:
@@ -400,7 +465,8 @@ class _Run:
         return max(self._largest(residual) / allowed, abs(gap) / 1e-11)
 
     def _predicted(self) -> bool:
-        """Whether the stress that the mixed Hessian was taken at is the state's own, as exact as its residual is."""
+        """Whether the stress that the mixed Hessian was taken at is the state's own, as exact as
+        its residual is."""
         force, noise = self.system.force_scale()
         error = np.abs(self.system.predicted_stress - self.system.stress())
         error[:, 3:] /= self.system.scene.length_scale
@@ -419,7 +485,8 @@ class _Run:
         return min(1.0, cap / max(turn, np.finfo(float).tiny))
 
     def _close_gap(self) -> None:
-        """Spread what the mean angle lacks over all actuated hinges: descent keeps the equation satisfied."""
+        """Spread what the mean angle lacks over all actuated hinges: descent keeps the equation
+        satisfied."""
         if self.system.constraint is None:
             return
         angles = self.state.angles.copy()
@@ -428,25 +495,33 @@ class _Run:
 
     def _check_budget(self) -> None:
         if self.iterations >= self.options.max_iterations:
-            raise SimulationFailure(f"no equilibrium within {self.options.max_iterations} Newton iterations"
-                                    f"{self._bent_too_far()}")
+            raise SimulationFailure(
+                f"no equilibrium within {self.options.max_iterations} Newton iterations"
+                f"{self._bent_too_far()}"
+            )
         self.iterations += 1
 
     def _bent_too_far(self) -> str:
-        """A hint where an element bends or twists so far that its strain is about to be undefined, else nothing."""
+        """A hint where an element bends or twists so far that its strain is about to be undefined,
+        else nothing."""
         system = self.system
         turns = np.linalg.norm(
-            system.strain[:, 3:] + system.lengths[:, None] * system.scene.rest_strain[:, 3:], axis=1)
+            system.strain[:, 3:] + system.lengths[:, None] * system.scene.rest_strain[:, 3:], axis=1
+        )
         worst = int(np.argmax(turns))
-        return f": element {worst} turns by {turns[worst]:.2f} rad, divide its rod more finely" if (
-            turns[worst] > _BENT_TOO_FAR) else ""
+        return (
+            f": element {worst} turns by {turns[worst]:.2f} rad, divide its rod more finely"
+            if (turns[worst] > _BENT_TOO_FAR)
+            else ""
+        )
 
 
 def refine(system: System, equilibrium: Equilibrium, steps: int = 3) -> Equilibrium:
-    """The same equilibrium converged to round-off: plain Newton steps as long as they lower the residual.
+    """The same equilibrium converged to round-off: plain Newton steps as long as they lower the
+    residual.
 
-    For states that are kept: Exudyn's Jacobian leaves part of the joints' stiffness out, so that near a bifurcation it
-    contracts slowly, and what it starts with is what it ends with.
+    For states that are kept: Exudyn's Jacobian leaves part of the joints' stiffness out, so that
+    near a bifurcation it contracts slowly, and what it starts with is what it ends with.
     """
     run = _Run(system, equilibrium.q, equilibrium.start, equilibrium.opening, NewtonOptions())
     system.set_parameters(equilibrium.q)
@@ -464,5 +539,12 @@ def refine(system: System, equilibrium: Equilibrium, steps: int = 3) -> Equilibr
             break
         best = (run.state, run.torque, energy, system.stress(), run.relative(residual))
     state, torque, energy, stress, relative = best
-    return replace(equilibrium, state=state, torque=torque, stress=stress, elastic_energy=energy.elastic,
-                   potential=energy.potential, residual=relative)
+    return replace(
+        equilibrium,
+        state=state,
+        torque=torque,
+        stress=stress,
+        elastic_energy=energy.elastic,
+        potential=energy.potential,
+        residual=relative,
+    )

@@ -1,17 +1,21 @@
-"""Equilibrium paths in a load factor, through limit points: where they turn, where they branch, what is stable.
+"""Equilibrium paths in a load factor, through limit points: where they turn, where they branch,
+what is stable.
 
-Unknowns are the state x and the factor t of a load: R(x, t) = dPi/dx + t dE_load/dx = 0, with the arc length measured in
-the state alone (Crisfield 1981; a load without any effect has no path). Each step goes along the tangent and is
-corrected in the plane normal to it by the bordered system  K d + f dt = -R,  a.d = 0,  with the geometric stiffness at
-the predicted stress as in `newton`. The stiffness may be indefinite: a path goes on over unstable states.
+Unknowns are the state x and the factor t of a load: R(x, t) = dPi/dx + t dE_load/dx = 0, with the
+arc length measured in the state alone (Crisfield 1981; a load without any effect has no path). Each
+step goes along the tangent and is corrected in the plane normal to it by the bordered system  K d +
+f dt = -R,  a.d = 0,  with the geometric stiffness at the predicted stress as in `newton`. The
+stiffness may be indefinite: a path goes on over unstable states.
 
-A coordinate that is driven instead of loaded has the same equilibria: load it by a unit force and read the coordinate
-as the point's `displacement`, the work-conjugate of the factor.
+A coordinate that is driven instead of loaded has the same equilibria: load it by a unit force and
+read the coordinate as the point's `displacement`, the work-conjugate of the factor.
 """
+
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Callable
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +29,9 @@ from .system import System
 
 _GROWTH, _EASY, _HARD = 1.5, 5, 8  # iterations after which steps grow, and after which they shrink
 _SMALLEST = 1e-6  # of the largest step: below it the path is lost
-_SMOOTH = 0.3  # rad that the tangent, and share of its largest value that the factor's rate, may change by in a step
+# rad that the tangent, and share of its largest value that the factor's rate, may change by in a
+# step
+_SMOOTH = 0.3
 _SHARPEST = 1e-3  # of the largest step: below it such changes are taken for a corner of the path
 _BISECTIONS = 40
 _LOCATED = 1e-7  # relative, of the factor at a critical point: closer to it the tangents are noise
@@ -83,10 +89,11 @@ class PathPoint:
 class CriticalPoint:
     """Where a path turns or branches.
 
-    kind : "limit" (the factor turns), "turning" (the displacement turns), "bifurcation" (neither does, but the Hessian
-        is singular)
+    kind : "limit" (the factor turns), "turning" (the displacement turns), "bifurcation" (neither
+        does, but the Hessian is singular)
     point : just behind it
-    mode : (n_free,) the Hessian's softest direction there, largest entry 1; for a turning point the path's tangent
+    mode : (n_free,) the Hessian's softest direction there, largest entry 1; for a turning point the
+        path's tangent
     """
 
     kind: str
@@ -118,19 +125,27 @@ class Path:
 
 
 def trace(
-    scene: Scene, q: np.ndarray, load: Any = None, *, stop: Callable[[PathPoint], bool],
-    start: Equilibrium | State | None = None, factor: float = 0.0, direction: int = 1,
+    scene: Scene,
+    q: np.ndarray,
+    load: Any = None,
+    *,
+    stop: Callable[[PathPoint], bool],
+    start: Equilibrium | State | None = None,
+    factor: float = 0.0,
+    direction: int = 1,
     options: PathOptions = PathOptions(),
 ) -> Path:
     """Trace the equilibria of a scene under a load that is multiplied by a factor.
 
     Parameters
     ----------
-    load : the term to be multiplied, in addition to the scene's own; None: the torque of the scene's actuation, whose
-        displacement is the opening angle and whose factor is minus the multiplier of `solve`
+    load : the term to be multiplied, in addition to the scene's own; None: the torque of the
+        scene's actuation, whose displacement is the opening angle and whose factor is minus the
+        multiplier of `solve`
     stop : true at the point where the path may end
-    start, factor : where to start. An Equilibrium is taken as it is (of an actuated scene with its torque); from a state,
-        default the scene's initial one, a stable equilibrium at the factor is looked for first
+    start, factor : where to start. An Equilibrium is taken as it is (of an actuated scene with its
+        torque); from a state, default the scene's initial one, a stable equilibrium at the factor
+        is looked for first
     direction : 1 to start towards larger factors, -1 towards smaller ones
 
     Raises SimulationFailure when no start is found, when the path is lost or doesn't end in time.
@@ -158,7 +173,9 @@ class _Tracer:
         self._load_rows = s.kept[load.dofs]
         self._load_rows[self._load_rows >= s.n_free] = -1
 
-    def trace(self, state: State, factor: float, direction: int, stop: Callable[[PathPoint], bool]) -> Path:
+    def trace(
+        self, state: State, factor: float, direction: int, stop: Callable[[PathPoint], bool]
+    ) -> Path:
         point = self._point(state, factor, None)
         if point.factor_rate * direction < 0:
             point = _reversed(point)
@@ -188,7 +205,9 @@ class _Tracer:
         cosine = ahead.tangent @ (self.system.metric * points[-1].tangent)
         largest = max(abs(point.factor_rate) for point in points)
         change = abs(ahead.factor_rate - points[-1].factor_rate)
-        return bool(cosine < np.cos(_SMOOTH) or change > _SMOOTH * max(largest, abs(ahead.factor_rate)))
+        return bool(
+            cosine < np.cos(_SMOOTH) or change > _SMOOTH * max(largest, abs(ahead.factor_rate))
+        )
 
     def _largest_step(self, point: PathPoint) -> float:
         """Arc length at which the tangent turns or moves something by as much as is allowed."""
@@ -198,7 +217,8 @@ class _Tracer:
         return self.options.rotation / max(turn, move)
 
     def _advance(self, point: PathPoint, step: float) -> tuple[PathPoint | None, int]:
-        """The point of the path in the plane a step ahead, or None when the correction fails; and its iterations."""
+        """The point of the path in the plane a step ahead, or None when the correction fails; and
+        its iterations."""
         system, options = self.system, self.options
         normal = system.metric * point.tangent
         state = point.state.moved(system.increment(step * point.tangent))
@@ -220,7 +240,9 @@ class _Tracer:
             factor += change
         return None, options.max_iterations
 
-    def _assemble(self, state: State, factor: float, mixed: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    def _assemble(
+        self, state: State, factor: float, mixed: bool = False
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Residual and its derivative in the factor, (n_free,) each."""
         system = self.system
         self.load.factor = factor
@@ -243,22 +265,34 @@ class _Tracer:
         column = system.solve(slope)
         size = float(np.sqrt(column @ (system.metric * column)))
         if not 0 < size < np.inf:
-            raise SimulationFailure("the load does no work on this scene, or its stiffness is singular")
+            raise SimulationFailure(
+                "the load does no work on this scene, or its stiffness is singular"
+            )
         tangent, rate = -column / size, 1 / size
         if along is not None and tangent @ (system.metric * along) < 0:
             tangent, rate = -tangent, -rate
         return PathPoint(
-            state=state, factor=float(factor), displacement=-float(self.load.term.energy(state)),
-            elastic_energy=self._elastic, stress=system.stress(), negative=negative,
-            held=is_convex(negative, Border(column, float(slope @ column))), factor_rate=rate,
-            displacement_rate=-float(slope @ tangent), tangent=tangent,
+            state=state,
+            factor=float(factor),
+            displacement=-float(self.load.term.energy(state)),
+            elastic_energy=self._elastic,
+            stress=system.stress(),
+            negative=negative,
+            held=is_convex(negative, Border(column, float(slope @ column))),
+            factor_rate=rate,
+            displacement_rate=-float(slope @ tangent),
+            tangent=tangent,
         )
 
-    # -- critical points -------------------------------------------------------------------------------------------
-    def _critical_between(self, point: PathPoint, ahead: PathPoint, step: float) -> list[CriticalPoint]:
-        """All critical points on a step, by bisection of its length on what differs between its ends.
+    # -- critical points -----------------------------------------------------------------------
+    def _critical_between(
+        self, point: PathPoint, ahead: PathPoint, step: float
+    ) -> list[CriticalPoint]:
+        """All critical points on a step, by bisection of its length on what differs between its
+        ends.
 
-        What doesn't differ there is not looked at: next to a singular stiffness the tangent's signs are noise.
+        What doesn't differ there is not looked at: next to a singular stiffness the tangent's signs
+        are noise.
         """
         differs = [a != b for a, b in zip(point.signature, ahead.signature)]
 
@@ -277,18 +311,23 @@ class _Tracer:
                     low, before = 0.5 * (low + high), middle
                 else:
                     high, behind = 0.5 * (low + high), middle
-                if high - low < 1e-3 * step and abs(behind.factor - before.factor) <= _LOCATED * abs(behind.factor):
+                if high - low < 1e-3 * step and abs(
+                    behind.factor - before.factor
+                ) <= _LOCATED * abs(behind.factor):
                     break
             found.append(self._critical(before, behind, differs))
             low, before = high, behind
         return found
 
     def _critical(self, before: PathPoint, behind: PathPoint, differs: list[bool]) -> CriticalPoint:
-        count, factor, _ = (a != b and counts for a, b, counts in zip(before.signature, behind.signature, differs))
+        count, factor, _ = (
+            a != b and counts for a, b, counts in zip(before.signature, behind.signature, differs)
+        )
         if not count and not factor:
             return CriticalPoint("turning", behind, behind.tangent / np.abs(behind.tangent).max())
         self._point(behind.state, behind.factor, None)
-        mode = np.sin(np.arange(1, self.system.n_unknowns + 1) * 0.7390851)  # without symmetry, and reproducible
+        # without symmetry, and reproducible
+        mode = np.sin(np.arange(1, self.system.n_unknowns + 1) * 0.7390851)
         for _ in range(4):
             mode = self.system.solve(self.system.metric * mode)
             mode /= mode[np.argmax(np.abs(mode))]
@@ -296,5 +335,9 @@ class _Tracer:
 
 
 def _reversed(point: PathPoint) -> PathPoint:
-    return replace(point, tangent=-point.tangent, factor_rate=-point.factor_rate,
-                   displacement_rate=-point.displacement_rate)
+    return replace(
+        point,
+        tangent=-point.tangent,
+        factor_rate=-point.factor_rate,
+        displacement_rate=-point.displacement_rate,
+    )

@@ -1,8 +1,10 @@
-"""Derivatives of an equilibrium in the parameters, from its own factorisation: adjoint and full, no differences.
+"""Derivatives of an equilibrium in the parameters, from its own factorisation: adjoint and full, no
+differences.
 
-At equilibrium R(x, q) + tau c = 0 and c.x fixed, so x_q solves K x_q + c tau_q = -R_q, c.x_q = 0. R_q is sparse:
-B^T dsigma/dL for a rest length, the Hessian's own columns for a driven unknown.
+At equilibrium R(x, q) + tau c = 0 and c.x fixed, so x_q solves K x_q + c tau_q = -R_q, c.x_q = 0.
+R_q is sparse: B^T dsigma/dL for a rest length, the Hessian's own columns for a driven unknown.
 """
+
 from __future__ import annotations
 
 from functools import cached_property
@@ -24,9 +26,11 @@ _CHUNK = 256  # elements at a time, to bound memory
 
 
 class Sensitivities:
-    """All first derivatives of one equilibrium, and the exact second derivatives of its potential energy.
+    """All first derivatives of one equilibrium, and the exact second derivatives of its potential
+    energy.
 
-    Nothing is computed before it is asked for. Uses (and if need be restores) the factorisation in the system.
+    Nothing is computed before it is asked for. Uses (and if need be restores) the factorisation in
+    the system.
     """
 
     def __init__(self, system: System, equilibrium: Equilibrium):
@@ -40,20 +44,25 @@ class Sensitivities:
         scene, s = system.scene, system.sparsity
         self._strain = system.strain.copy()
         energy_L, stress_L, self._energy_LL = length_derivative(
-            self._strain, system.lengths, scene.stiffness, scene.rest_strain)
+            self._strain, system.lengths, scene.stiffness, scene.rest_strain
+        )
         self._energy_L, self._stress_L = energy_L, stress_L
         self._has = np.flatnonzero(scene.length_parameter >= 0)
-        self._driven_values = system.values[s.n_factor_values:].copy()
+        self._driven_values = system.values[s.n_factor_values :].copy()
         self._gradient = system.gradient.copy()
-        self._B = system.strain_displacement  # the system's own: like its factorisation, good until it moves on
+        # the system's own: like its factorisation, good until it moves on
+        self._B = system.strain_displacement
         self._length_entries = self._differentiate_by_length()
         self._residual_q = self._assemble_residual_q()
 
-    # -- states ----------------------------------------------------------------------------------------------------
+    # -- states --------------------------------------------------------------------------------
     @cached_property
     def solutions(self) -> Solutions:
-        """x_q (n_free, n_parameters): all free unknowns in all parameters; angles in rad, translations global."""
-        return self.system.solve_columns(-self._residual_q, None if self._border is None else self._border.column)
+        """x_q (n_free, n_parameters): all free unknowns in all parameters; angles in rad,
+        translations global."""
+        return self.system.solve_columns(
+            -self._residual_q, None if self._border is None else self._border.column
+        )
 
     @property
     def full(self) -> np.ndarray:
@@ -61,7 +70,8 @@ class Sensitivities:
         return self.solutions.rows(np.arange(self._n))
 
     def rows(self, dofs: np.ndarray) -> np.ndarray:
-        """Derivatives (m, n_parameters) of any unknowns of the scene, pinned (zero) and driven ones included."""
+        """Derivatives (m, n_parameters) of any unknowns of the scene, pinned (zero) and driven ones
+        included."""
         kept = self.system.sparsity.kept[dofs]
         out = np.zeros((len(kept), self.system.scene.n_parameters))
         free = (kept >= 0) & (kept < self._n)
@@ -94,42 +104,51 @@ class Sensitivities:
         return d, float(t)
 
     def adjoint(self, dofs: np.ndarray, cotangent: np.ndarray) -> np.ndarray:
-        """Gradient (n_parameters,) of J given dJ/d(unknowns) (m,) at some unknowns: one solve, no x_q."""
+        """Gradient (n_parameters,) of J given dJ/d(unknowns) (m,) at some unknowns: one solve, no
+        x_q."""
         kept = self.system.sparsity.kept[dofs]
         load = np.zeros(self._n + self.system.sparsity.n_driven)
         np.add.at(load, kept[kept >= 0], np.asarray(cotangent, float)[kept >= 0])
         return self._by_load(load)
 
-    # -- stresses --------------------------------------------------------------------------------------------------
+    # -- stresses ------------------------------------------------------------------------------
     @cached_property
     def stresses(self) -> np.ndarray:
-        """Derivatives (E, 6, n_parameters) of the elements' generalised stresses; memory E x 6 x n_parameters."""
+        """Derivatives (E, 6, n_parameters) of the elements' generalised stresses; memory E x 6 x
+        n_parameters."""
         scene, s = self.system.scene, self.system.sparsity
-        kept = np.concatenate([self.full, self._driven_map.toarray(), np.zeros((1, scene.n_parameters))])
+        kept = np.concatenate(
+            [self.full, self._driven_map.toarray(), np.zeros((1, scene.n_parameters))]
+        )
         out = np.empty((len(scene.elements), 6, scene.n_parameters))
         factor = self._B * (scene.stiffness / self.system.lengths[:, None])[:, :, None]
         for first in range(0, len(out), _CHUNK):  # absent unknowns (-1) read the row of zeros
             some = slice(first, first + _CHUNK)
             np.matmul(factor[some], kept[s.rows[some]], out=out[some])
         has = self._has
-        out[has, :, scene.length_parameter[has]] += self._stress_L[has] * scene.length_factor[has][:, None]
+        out[has, :, scene.length_parameter[has]] += (
+            self._stress_L[has] * scene.length_factor[has][:, None]
+        )
         return out
 
     def stress_adjoint(self, cotangent: np.ndarray) -> np.ndarray:
-        """Gradient (n_parameters,) of J given dJ/d(generalised stresses) (E, 6): one solve, no x_q."""
+        """Gradient (n_parameters,) of J given dJ/d(generalised stresses) (E, 6): one solve, no
+        x_q."""
         explicit = np.einsum("er,er->e", self._stress_L, cotangent)
         return self._by_parameter(explicit) + self._by_load(self._scattered(cotangent))
 
-    # -- energies --------------------------------------------------------------------------------------------------
+    # -- energies ------------------------------------------------------------------------------
     @cached_property
     def potential_gradient(self) -> np.ndarray:
-        """d(potential)/dq (n_parameters,): by the envelope theorem only the explicit part counts."""
+        """d(potential)/dq (n_parameters,): by the envelope theorem only the explicit part
+        counts."""
         explicit = self._by_parameter(self._energy_L + self._weight_energy_L())
-        return explicit + self._driven_map.T @ self._gradient[self._n:]
+        return explicit + self._driven_map.T @ self._gradient[self._n :]
 
     @cached_property
     def energy_gradient(self) -> np.ndarray:
-        """d(elastic energy)/dq (n_parameters,), the work of loads and actuators taken out by one adjoint solve."""
+        """d(elastic energy)/dq (n_parameters,), the work of loads and actuators taken out by one
+        adjoint solve."""
         if not self._loaded:
             return self.potential_gradient
         return self._by_parameter(self._energy_L) + self._by_load(self._elastic_gradient())
@@ -150,33 +169,41 @@ class Sensitivities:
             explicit = explicit + (lengths_driven + lengths_driven.T + driven.T @ block @ driven)
         explicit = explicit.tocoo()
         hessian = self.solutions.product(self._residual_q.T)
-        hessian[explicit.row, explicit.col] += explicit.data  # the only dense sum: these matrices are large
+        # the only dense sum: these matrices are large
+        hessian[explicit.row, explicit.col] += explicit.data
         hessian += hessian.T
         hessian *= 0.5
         return hessian
 
     @property
     def energy_hessian(self) -> np.ndarray:
-        """Exact d2(elastic energy)/dq2 of an unloaded scene; of a loaded one the potential's, a model of it."""
+        """Exact d2(elastic energy)/dq2 of an unloaded scene; of a loaded one the potential's, a
+        model of it."""
         return self.potential_hessian
 
-    # -- use -------------------------------------------------------------------------------------------------------
+    # -- use -----------------------------------------------------------------------------------
     def predict(self, dq: np.ndarray, dopening: float = 0.0) -> Start:
         """First-order prediction of the equilibrium at q + dq and opening + dopening: one solve."""
         system, eq = self.system, self.equilibrium
         rhs = -(self._residual_q @ dq)
-        step, change = bordered_solve(system, self._border, rhs, dopening if self._border is not None else 0.0)
+        step, change = bordered_solve(
+            system, self._border, rhs, dopening if self._border is not None else 0.0
+        )
         kept = np.concatenate([step, self._driven_map @ dq])
-        return Start(eq.state.moved(system.increment(step)), eq.torque + float(change),
-                     eq.stress + self._stress_change(kept, dq))
+        return Start(
+            eq.state.moved(system.increment(step)),
+            eq.torque + float(change),
+            eq.stress + self._stress_change(kept, dq),
+        )
 
     @cached_property
     def trusted(self) -> bool:
-        """Whether derivatives can be relied on: False close to a bifurcation or limit point, and under moments without
-        potential, whose tangent's skew part is not in the factorisation."""
+        """Whether derivatives can be relied on: False close to a bifurcation or limit point, and
+        under moments without potential, whose tangent's skew part is not in the factorisation."""
         if not self.system.conservative:
             return False
-        # columns in uneven shares: in a plain sum those of symmetric parameters could cancel out of the softest mode
+        # columns in uneven shares: in a plain sum those of symmetric parameters could cancel out of
+        # the softest mode
         shares = 1.0 + 0.5 * np.sin(np.arange(1, self._residual_q.shape[1] + 1) * 0.7390851)
         probe = self._residual_q @ shares
         size = np.abs(probe).max(initial=0.0)
@@ -188,9 +215,11 @@ class Sensitivities:
         residual = self.system.multiply(d) - probe
         if self._border is not None and self.system.constraint is not None:
             residual = residual + self.system.constraint * t
-        return bool(np.isfinite(residual).all() and np.abs(residual).max() <= _TRUSTED_RESIDUAL * size)
+        return bool(
+            np.isfinite(residual).all() and np.abs(residual).max() <= _TRUSTED_RESIDUAL * size
+        )
 
-    # -- pieces ----------------------------------------------------------------------------------------------------
+    # -- pieces --------------------------------------------------------------------------------
     @property
     def _n(self) -> int:
         return self.system.n_unknowns
@@ -203,17 +232,23 @@ class Sensitivities:
     def _driven_map(self) -> sp.csr_matrix:
         """d(driven unknowns)/dq (n_driven, n_parameters)."""
         d = self.system.scene.driven
-        return sp.csr_matrix((d.factors, (np.arange(len(d.dofs)), d.parameters)),
-                             shape=(len(d.dofs), self.system.scene.n_parameters))
+        return sp.csr_matrix(
+            (d.factors, (np.arange(len(d.dofs)), d.parameters)),
+            shape=(len(d.dofs), self.system.scene.n_parameters),
+        )
 
     def _by_parameter(self, per_element: np.ndarray) -> np.ndarray:
         """Sum element values (E,), derivatives in the rest length, into their parameters."""
         scene, has = self.system.scene, self._has
-        return np.bincount(scene.length_parameter[has], scene.length_factor[has] * per_element[has],
-                           minlength=scene.n_parameters)
+        return np.bincount(
+            scene.length_parameter[has],
+            scene.length_factor[has] * per_element[has],
+            minlength=scene.n_parameters,
+        )
 
     def _differentiate_by_length(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Entries of d(gradient)/d(lengths' parameters): kept rows, parameters, values, one after the other."""
+        """Entries of d(gradient)/d(lengths' parameters): kept rows, parameters, values, one after
+        the other."""
         scene, has = self.system.scene, self._has
         block = np.einsum("eri,er->ei", self._B[has], self._stress_L[has])
         if scene.weight is not None:
@@ -230,26 +265,38 @@ class Sensitivities:
         if s.n_driven:
             # the Hessian's columns of driven unknowns, each for the one parameter that drives it
             driven = s.driven_column
-            rows = np.concatenate([rows, s.indices[s.n_factor_values:]])
+            rows = np.concatenate([rows, s.indices[s.n_factor_values :]])
             columns = np.concatenate([columns, scene.driven.parameters[driven]])
             values = np.concatenate([values, self._driven_values * scene.driven.factors[driven]])
         free = rows < s.n_free
-        return sp.csc_matrix((values[free], (rows[free], columns[free])), shape=(s.n_free, scene.n_parameters))
+        return sp.csc_matrix(
+            (values[free], (rows[free], columns[free])), shape=(s.n_free, scene.n_parameters)
+        )
 
     def _lengths_in_driven(self) -> sp.csr_matrix:
         """d(gradient in the driven unknowns)/d(lengths' parameters) (n_driven, n_parameters)."""
         rows, columns, values = self._length_entries
         driven = rows >= self._n
-        return sp.csr_matrix((values[driven], (rows[driven] - self._n, columns[driven])),
-                             shape=(self.system.sparsity.n_driven, self.system.scene.n_parameters))
+        return sp.csr_matrix(
+            (values[driven], (rows[driven] - self._n, columns[driven])),
+            shape=(self.system.sparsity.n_driven, self.system.scene.n_parameters),
+        )
 
     def _stress_change(self, kept: np.ndarray, dq: np.ndarray) -> np.ndarray:
-        """First-order change (E, 6) of the generalised stresses, for an increment of the kept unknowns and of q."""
+        """First-order change (E, 6) of the generalised stresses, for an increment of the kept
+        unknowns and of q."""
         scene, s = self.system.scene, self.system.sparsity
         increment = np.append(kept, 0.0)[s.rows]  # absent unknowns (-1) read the appended zero
-        change = np.einsum("eri,ei->er", self._B, increment) * scene.stiffness / self.system.lengths[:, None]
+        change = (
+            np.einsum("eri,ei->er", self._B, increment)
+            * scene.stiffness
+            / self.system.lengths[:, None]
+        )
         has = self._has
-        change[has] += self._stress_L[has] * (scene.length_factor[has] * dq[scene.length_parameter[has]])[:, None]
+        change[has] += (
+            self._stress_L[has]
+            * (scene.length_factor[has] * dq[scene.length_parameter[has]])[:, None]
+        )
         return change
 
     def _weight_energy_L(self) -> np.ndarray | float:
@@ -258,21 +305,26 @@ class Sensitivities:
         if scene.weight is None:
             return 0.0
         x = scene.node_poses(self.equilibrium.state)[0]
-        return -0.5 * np.einsum("ei,ei->e", scene.weight, x[scene.elements[:, 0]] + x[scene.elements[:, 1]])
+        return -0.5 * np.einsum(
+            "ei,ei->e", scene.weight, x[scene.elements[:, 0]] + x[scene.elements[:, 1]]
+        )
 
     def _by_load(self, load: np.ndarray) -> np.ndarray:
         """Gradient (n_parameters,) of J by way of the state, given dJ/d(kept unknowns)."""
         multiplier, _ = bordered_solve(self.system, self._border, load[: self._n])
-        return self._driven_map.T @ load[self._n:] - self._residual_q.T @ multiplier
+        return self._driven_map.T @ load[self._n :] - self._residual_q.T @ multiplier
 
     def _elastic_gradient(self) -> np.ndarray:
         """d(elastic energy)/d(kept unknowns) at the equilibrium."""
         return self._scattered(self._strain)
 
     def _scattered(self, values: np.ndarray) -> np.ndarray:
-        """B^T C v summed into the kept unknowns, for v (E, 6) and the elements' stiffnesses C = stiffness / length."""
+        """B^T C v summed into the kept unknowns, for v (E, 6) and the elements' stiffnesses C =
+        stiffness / length."""
         s, scene = self.system.sparsity, self.system.scene
-        block = np.einsum("eri,er->ei", self._B, scene.stiffness * values / self.system.lengths[:, None])
+        block = np.einsum(
+            "eri,er->ei", self._B, scene.stiffness * values / self.system.lengths[:, None]
+        )
         keep = s.rows >= 0
         return np.bincount(s.rows[keep], block[keep], minlength=s.n_free + s.n_driven)
 
@@ -287,7 +339,7 @@ def _weight_gradient_per_length(scene: Scene, state: State) -> np.ndarray:
         node = scene.elements[:, end]
         Rb = state.rotations[scene.node_body[node]]
         force = np.einsum("nji,nj->ni", Rb, half)
-        out[:, 7 * end: 7 * end + 3] = half
-        out[:, 7 * end + 3: 7 * end + 6] = np.cross(arms[node], force)
+        out[:, 7 * end : 7 * end + 3] = half
+        out[:, 7 * end + 3 : 7 * end + 6] = np.cross(arms[node], force)
         out[:, 7 * end + 6] = np.einsum("ni,ni->n", rates[node], force)
     return out

@@ -1,10 +1,13 @@
-"""A start for hopeless cases: the equilibrium of the same scene with rods that give way along their axis.
+"""A start for hopeless cases: the equilibrium of the same scene with rods that give way along their
+axis.
 
-Slender rods resist stretching 1e3 to 1e9 times more than bending. From a start far off, iterations then follow the
-narrow valleys of the stretch-stiff energy, or end where an element turns by pi and its strain is no longer defined.
-With stiffnesses against stretch and shear near those against bending the landscape is benign, and its equilibrium is
-so near to the true one that a few iterations lead there.
+Slender rods resist stretching 1e3 to 1e9 times more than bending. From a start far off, iterations
+then follow the narrow valleys of the stretch-stiff energy, or end where an element turns by pi and
+its strain is no longer defined. With stiffnesses against stretch and shear near those against
+bending the landscape is benign, and its equilibrium is so near to the true one that a few
+iterations lead there.
 """
+
 from __future__ import annotations
 
 from dataclasses import replace

@@ -1,4 +1,5 @@
 """How stable an equilibrium is: the softest mode and its eigenvalue."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -13,24 +14,30 @@ from .system import System
 
 @dataclass(frozen=True)
 class SoftestMode:
-    """eigenvalue : energy / rad^2 (negative: unstable); vector : (n_free,), largest rotation 1 rad."""
+    """eigenvalue : energy / rad^2 (negative: unstable); vector : (n_free,), largest rotation 1
+    rad."""
 
     eigenvalue: float
     vector: np.ndarray
 
 
 def softest_mode(system: System) -> SoftestMode:
-    """Lowest eigenvalue of K v = lambda M v on the actuation's kernel, for the Hessian assembled last.
+    """Lowest eigenvalue of K v = lambda M v on the actuation's kernel, for the Hessian assembled
+    last.
 
-    M is the system's metric (1 for rotations, 1 / length_scale^2 for translations), so the eigenvalue is an energy
-    and doesn't depend on the unit of length. Shift-and-invert Lanczos; leaves a shifted factorisation behind.
+    M is the system's metric (1 for rotations, 1 / length_scale^2 for translations), so the
+    eigenvalue is an energy and doesn't depend on the unit of length. Shift-and-invert Lanczos;
+    leaves a shifted factorisation behind.
     """
     shift, border = factorise_convex(system)
     n, metric = system.n_unknowns, system.metric
     # work in the scaled unknowns M^1/2 v, where the problem is a standard one
     root = np.sqrt(metric)
-    inverse = spla.LinearOperator((n, n), matvec=lambda v: root * bordered_solve(system, border, root * v.ravel())[0])
-    start = np.sin(np.arange(1, n + 1) * 0.7390851)  # fixed, without symmetry, so that the result is reproducible
+    inverse = spla.LinearOperator(
+        (n, n), matvec=lambda v: root * bordered_solve(system, border, root * v.ravel())[0]
+    )
+    # fixed, without symmetry, so that the result is reproducible
+    start = np.sin(np.arange(1, n + 1) * 0.7390851)
     if n < 4:
         dense = np.column_stack([inverse.matvec(e) for e in np.eye(n)])
         values, vectors = np.linalg.eigh(0.5 * (dense + dense.T))
@@ -44,6 +51,7 @@ def softest_mode(system: System) -> SoftestMode:
 
 
 def stiffness_matrix(system: System) -> sp.csc_matrix:
-    """The full symmetric Hessian (n_free, n_free) assembled last, for looking at and for other people's solvers."""
+    """The full symmetric Hessian (n_free, n_free) assembled last, for looking at and for other
+    people's solvers."""
     upper = system.sparsity.free_matrix(system.values)
     return (upper + sp.triu(upper, 1).T).tocsc()

@@ -1,4 +1,6 @@
-"""A scene's equations: gradient, Hessian and factorisation, with all arrays made once a topology."""
+"""A scene's equations: gradient, Hessian and factorisation, with all arrays made once a
+topology."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -8,7 +10,14 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..scene.assembly import (
-    ENERGY, GRADIENT, HESSIAN, assemble_rods, largest_forces, predict_stress, scatter_blocks, scratch_arrays,
+    ENERGY,
+    GRADIENT,
+    HESSIAN,
+    assemble_rods,
+    largest_forces,
+    predict_stress,
+    scatter_blocks,
+    scratch_arrays,
 )
 from ..scene.scene import Scene
 from ..scene.sparsity import sparsity_of
@@ -19,7 +28,8 @@ from .factorisation import Factorisation
 
 @dataclass
 class Counters:
-    """What a system was asked to do, for profiles and for tests that count calls. Seconds are wall time."""
+    """What a system was asked to do, for profiles and for tests that count calls. Seconds are wall
+    time."""
 
     energies: int = 0
     gradients: int = 0
@@ -33,7 +43,8 @@ class Counters:
 
 @dataclass(frozen=True)
 class Energy:
-    """elastic : strain energy of the rods; potential : elastic plus loads, attraction and actuators."""
+    """elastic : strain energy of the rods; potential : elastic plus loads, attraction and
+    actuators."""
 
     elastic: float
     potential: float
@@ -42,8 +53,8 @@ class Energy:
 class System:
     """Solver workspace of one scene. Not to be shared between threads or processes.
 
-    After `assemble`, `gradient` (n_kept,), `values`, `strain` (E, 6) and `strain_displacement` (E, 6, 14) belong to
-    the state assembled last.
+    After `assemble`, `gradient` (n_kept,), `values`, `strain` (E, 6) and `strain_displacement` (E,
+    6, 14) belong to the state assembled last.
     """
 
     def __init__(self, scene: Scene):
@@ -66,10 +77,12 @@ class System:
         self.constraint = self._constraint()
         self._forces: tuple[float, float] | None = None  # of the state assembled last
         self._constraint_solution: np.ndarray | None = None  # of the factorisation at hand
-        self.factorised_at: State | None = None  # where the unshifted, unmixed Hessian at hand was factorised
+        # where the unshifted, unmixed Hessian at hand was factorised
+        self.factorised_at: State | None = None
         self.is_rotation = self._dof_is_rotation()[s.free]
         self.rotations = np.flatnonzero(self.is_rotation)  # taking numbers is quicker than a mask
-        self.force_weight = np.where(self.is_rotation, 1 / scene.length_scale, 1.0)  # moments count as forces
+        # moments count as forces
+        self.force_weight = np.where(self.is_rotation, 1 / scene.length_scale, 1.0)
 
     @property
     def n_unknowns(self) -> int:
@@ -82,7 +95,8 @@ class System:
 
     @property
     def singular(self) -> bool:
-        """Whether the last factorisation met an exactly zero pivot, so that nothing can be solved with it."""
+        """Whether the last factorisation met an exactly zero pivot, so that nothing can be solved
+        with it."""
         return self.factorisation.singular
 
     def set_parameters(self, q: np.ndarray) -> None:
@@ -103,10 +117,31 @@ class System:
         if order == HESSIAN:
             self.values[:] = 0.0
         elastic, load = assemble_rods(
-            order, state.positions, state.rotations, state.angles, scene.hinge_axis, scene.hinge_centre,
-            scene.node_body, scene.node_hinge, self._plain, scene.node_frame, scene.node_offset, scene.elements,
-            self.lengths, scene.rest_strain, scene.stiffness, self._weight, self.predicted_stress, mixed, s.rows,
-            s.slots, self.gradient, self.values, self.strain, self.strain_displacement, self._scratch,
+            order,
+            state.positions,
+            state.rotations,
+            state.angles,
+            scene.hinge_axis,
+            scene.hinge_centre,
+            scene.node_body,
+            scene.node_hinge,
+            self._plain,
+            scene.node_frame,
+            scene.node_offset,
+            scene.elements,
+            self.lengths,
+            scene.rest_strain,
+            scene.stiffness,
+            self._weight,
+            self.predicted_stress,
+            mixed,
+            s.rows,
+            s.slots,
+            self.gradient,
+            self.values,
+            self.strain,
+            self.strain_displacement,
+            self._scratch,
         )
         potential = elastic + load
         for term, rows, slots in zip(scene.terms, s.term_rows, s.term_slots):
@@ -123,18 +158,27 @@ class System:
         return Energy(elastic, potential)
 
     def predict_stress(self, increment: np.ndarray) -> None:
-        """Store the stress that the increment (n_free,) leads to, linearised at the state assembled last."""
+        """Store the stress that the increment (n_free,) leads to, linearised at the state assembled
+        last."""
         kept = np.zeros(len(self.gradient))
         kept[: self.sparsity.n_free] = increment
-        predict_stress(self.strain, self.strain_displacement, self.sparsity.rows, kept, self.scene.stiffness,
-                       self.lengths, self.predicted_stress)
+        predict_stress(
+            self.strain,
+            self.strain_displacement,
+            self.sparsity.rows,
+            kept,
+            self.scene.stiffness,
+            self.lengths,
+            self.predicted_stress,
+        )
 
     def stress(self) -> np.ndarray:
         """Generalised stresses (E, 6) of the state assembled last."""
         return self.scene.stiffness * self.strain / self.lengths[:, None]
 
     def factorise(self, shift: float = 0.0) -> int:
-        """Factorise the assembled Hessian plus shift times the metric; returns how many pivots are not positive."""
+        """Factorise the assembled Hessian plus shift times the metric; returns how many pivots are
+        not positive."""
         begin = perf_counter()
         if shift:
             diagonal = self.values[self.sparsity.diagonal]
@@ -164,9 +208,12 @@ class System:
         return self._constraint_solution
 
     def solve_columns(self, rhs: sp.csc_matrix, column: np.ndarray | None = None) -> Solutions:
-        """Solutions (n_free, k) for many sparse right-hand sides; with column = K^-1 c on the constraint's kernel."""
+        """Solutions (n_free, k) for many sparse right-hand sides; with column = K^-1 c on the
+        constraint's kernel."""
         self.counters.solves += rhs.shape[1]
-        return self.factorisation.solve_columns(rhs, None if column is None else self.constraint, column)
+        return self.factorisation.solve_columns(
+            rhs, None if column is None else self.constraint, column
+        )
 
     def multiply(self, v: np.ndarray) -> np.ndarray:
         """K v with the assembled Hessian over the free unknowns."""
@@ -180,16 +227,19 @@ class System:
         return full
 
     def force_scale(self) -> tuple[float, float]:
-        """Largest internal force of the state assembled last, and the round-off level of its forces.
+        """Largest internal force of the state assembled last, and the round-off level of its
+        forces.
 
-        Moments count divided by the length scale. Round-off: coordinates of size s leave strains of about
-        eps s / L, hence forces of eps s EA / L.
+        Moments count divided by the length scale. Round-off: coordinates of size s leave strains of
+        about eps s / L, hence forces of eps s EA / L.
         """
         if self._forces is None:
             scene = self.scene
             force, moment, stretch = largest_forces(self.strain, scene.stiffness, self.lengths)
-            self._forces = (float(np.maximum(force, moment / scene.length_scale)),
-                            float(np.finfo(float).eps * scene.size * stretch))
+            self._forces = (
+                float(np.maximum(force, moment / scene.length_scale)),
+                float(np.finfo(float).eps * scene.size * stretch),
+            )
         return self._forces
 
     def _dof_is_rotation(self) -> np.ndarray:
@@ -198,7 +248,8 @@ class System:
         return rotation
 
     def _metric(self) -> np.ndarray:
-        """1 for rotations, 1 / length_scale^2 for translations: makes a shift independent of units."""
+        """1 for rotations, 1 / length_scale^2 for translations: makes a shift independent of
+        units."""
         metric = np.where(self._dof_is_rotation(), 1.0, self.scene.length_scale**-2)
         return metric[self.sparsity.free]
 

@@ -1,4 +1,6 @@
-"""Loads (or compiles, the first time) all compiled code, so that timings and progress bars start after it."""
+"""Loads (or compiles, the first time) all compiled code, so that timings and progress bars start
+after it."""
+
 from __future__ import annotations
 
 import numpy as np

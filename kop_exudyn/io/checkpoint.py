@@ -1,20 +1,22 @@
 """Checkpoints: a folder of named arrays, and the record of the job that they belong to."""
+
 from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
 from .. import __version__
 from ..errors import InputError
-from .arrays import load_arrays, save_arrays
-from .documents import check_envelope
-from .files import is_temporary, make_folder, read_bytes
-from .json_files import plain, read_json, write_json
+from ..files.arrays import load_arrays, save_arrays
+from ..files.documents import check_envelope
+from ..files.files import is_temporary, make_folder, read_bytes
+from ..files.json_files import plain, read_json, write_json
 
 CHECKPOINT_VERSION = 1
 _JOB_FILE = "job.json"
@@ -34,9 +36,12 @@ class Job:
 
     @classmethod
     def of(cls, settings: Mapping[str, Any], files: Iterable[str | Path]) -> Job:
-        """The job of these settings (numbers, texts, lists, mappings) and input files, told apart by their names."""
-        return cls({"kop_exudyn": __version__, **plain(settings)},
-                   {Path(path).name: hashlib.sha256(read_bytes(path)).hexdigest() for path in files})
+        """The job of these settings (numbers, texts, lists, mappings) and input files, told apart
+        by their names."""
+        return cls(
+            {"kop_exudyn": __version__, **plain(settings)},
+            {Path(path).name: hashlib.sha256(read_bytes(path)).hexdigest() for path in files},
+        )
 
     def difference(self, other: Job) -> str | None:
         """The first thing in which the jobs differ, in words; None when they are the same."""
@@ -47,14 +52,19 @@ class Job:
         for name in [*self.inputs, *other.inputs]:
             if self.inputs.get(name) != other.inputs.get(name):
                 changed = name in self.inputs and name in other.inputs
-                return f"the input file {name} {'has changed' if changed else 'belongs to one of them only'}"
+                what = "has changed" if changed else "belongs to one of them only"
+                return f"the input file {name} {what}"
         if list(self.inputs) != list(other.inputs):
             return "the input files have another order"
         return None
 
     def to_dict(self) -> dict[str, Any]:
-        return {"format": "kop_exudyn/job", "version": CHECKPOINT_VERSION, "settings": dict(self.settings),
-                "inputs": dict(self.inputs)}
+        return {
+            "format": "kop_exudyn/job",
+            "version": CHECKPOINT_VERSION,
+            "settings": dict(self.settings),
+            "inputs": dict(self.inputs),
+        }
 
     @classmethod
     def load(cls, path: str | Path) -> Job:
@@ -67,7 +77,8 @@ class Job:
 
 
 class CheckpointStore:
-    """Named sets of arrays in a folder, each saved in one go: a run killed at any moment leaves the last whole one.
+    """Named sets of arrays in a folder, each saved in one go: a run killed at any moment leaves the
+    last whole one.
 
     Make it with `open`, which sees to it that the folder's checkpoints belong to the job at hand.
     """
@@ -77,9 +88,11 @@ class CheckpointStore:
 
     @classmethod
     def open(cls, folder: str | Path, job: Job, *, resume: bool = False) -> CheckpointStore:
-        """Checkpoints for a job: with `resume` those that are there, otherwise none (older ones are removed).
+        """Checkpoints for a job: with `resume` those that are there, otherwise none (older ones are
+        removed).
 
-        Raises InputError when the folder can't be written, or when it is to be resumed but belongs to another job.
+        Raises InputError when the folder can't be written, or when it is to be resumed but belongs
+        to another job.
         """
         folder = make_folder(folder)
         for left in filter(is_temporary, list(folder.iterdir())):
@@ -88,8 +101,10 @@ class CheckpointStore:
         if resume and record.exists():
             difference = Job.load(record).difference(job)
             if difference is not None:
-                raise InputError(f"can't resume, the checkpoints belong to a different job: {difference}",
-                                 source=folder)
+                raise InputError(
+                    f"can't resume, the checkpoints belong to a different job: {difference}",
+                    source=folder,
+                )
             return cls(folder)
         store = cls(folder)
         store.clear()
@@ -97,7 +112,8 @@ class CheckpointStore:
         return store
 
     def load(self, name: str) -> dict[str, np.ndarray] | None:
-        """The arrays saved under a name, None when there are none. InputError when the file is damaged."""
+        """The arrays saved under a name, None when there are none. InputError when the file is
+        damaged."""
         path = self._path(name)
         return load_arrays(path) if path.exists() else None
 
@@ -124,7 +140,11 @@ def _flat(settings: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Nested settings by dotted name."""
     found: dict[str, Any] = {}
     for name, value in settings.items():
-        found |= _flat(value, f"{prefix}{name}.") if isinstance(value, Mapping) else {f"{prefix}{name}": value}
+        found |= (
+            _flat(value, f"{prefix}{name}.")
+            if isinstance(value, Mapping)
+            else {f"{prefix}{name}": value}
+        )
     return found
 
 

@@ -1,18 +1,20 @@
-"""Design files: JSON in the format "kop_exudyn/design", one design a file, a dataset a folder or a study file."""
+"""Design files: JSON in the format "kop_exudyn/design", one design a file, a dataset a folder or a
+study file."""
+
 from __future__ import annotations
 
 import os
 import re
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Iterable, Sequence
 
 from ..errors import InputError
+from ..files.documents import check_envelope, check_range, check_schema, has_schema
+from ..files.files import reason_of
+from ..files.json_files import read_json
 from ..structures.base import Design, design_from_dict
-from ..structures.umbrella import Umbrella
-from ..structures.umbrella_release import is_release
-from .documents import check_envelope, check_range, check_schema, has_schema
-from .files import reason_of
-from .json_files import read_json
+from ..structures.umbrella.design import Umbrella
+from ..structures.umbrella.release import is_release
 
 DESIGN_VERSION = 1
 _SUFFIXES = (".json", ".json.gz")
@@ -40,23 +42,15 @@ def load_design(path: str | Path) -> Design:
         raise error.at(path) from None
 
 
-def load_designs(folder: str | Path, select: int | Sequence[str] | None = None) -> list[Design]:
-    """The designs of a folder in the natural order of their file names (design_2 before design_10), or of a study file.
-
-    select : the first so many, or the names of files without their ending, in the order wanted; default: all
-
-    Raises InputError when there aren't that many, for unknown names, and when two designs have the same name.
-    """
-    return load_all(select_files(folder, select), folder)
-
-
 def load_all(files: Iterable[Path], source: str | Path) -> list[Design]:
     """The designs of these files; InputError, naming the source, when two have the same name."""
     designs = [load_design(path) for path in files]
     seen: dict[str, Design] = {}
     for design in designs:
         if design.name in seen:
-            raise InputError("two designs have the same name", source=source, field="name", value=design.name)
+            raise InputError(
+                "two designs have the same name", source=source, field="name", value=design.name
+            )
         seen[design.name] = design
     return designs
 
@@ -65,43 +59,56 @@ def design_files(folder: str | Path) -> list[Path]:
     """The design files of a folder, in natural order. Raises InputError when there is none."""
     folder = Path(folder)
     if not os.path.isdir(folder):
-        raise InputError("is a file, expected a folder of designs" if os.path.exists(folder) else "no such folder",
-                         source=folder)
+        raise InputError(
+            "is a file, expected a folder of designs"
+            if os.path.exists(folder)
+            else "no such folder",
+            source=folder,
+        )
     try:
         names = os.listdir(folder)
     except OSError as error:
         raise InputError(f"can't be read: {reason_of(error)}", source=folder) from None
-    found = [folder / name for name in names if name.endswith(_SUFFIXES) and not name.startswith(".")]
+    found = [
+        folder / name for name in names if name.endswith(_SUFFIXES) and not name.startswith(".")
+    ]
     if not found:
         raise InputError("contains no designs (files that end in .json or .json.gz)", source=folder)
     return sorted(found, key=_natural)
 
 
-def select_files(folder: str | Path, select: int | Sequence[str] | None = None) -> list[Path]:
-    """The files that `load_designs` reads, without reading them; raises its errors about the selection."""
-    from .studies import is_study, load_study  # which reads designs itself
-
-    return list(load_study(folder, select).files) if is_study(folder) else select_among(design_files(folder), select,
-                                                                                         folder)
-
-
-def select_among(paths: Sequence[Path], select: int | Sequence[str] | None, folder: str | Path) -> list[Path]:
+def select_among(
+    paths: Sequence[Path], select: int | Sequence[str] | None, folder: str | Path
+) -> list[Path]:
     """Some of these files, see `load_designs`; errors name the folder."""
     paths = list(paths)
     if select is None:
         return paths
     if isinstance(select, int):
         if not 1 <= select <= len(paths):
-            raise InputError(f"expected a number of designs from 1 to {len(paths)}", source=folder, field="designs",
-                             value=select)
+            raise InputError(
+                f"expected a number of designs from 1 to {len(paths)}",
+                source=folder,
+                field="designs",
+                value=select,
+            )
         return paths[:select]
     by_name = {_stem(path): path for path in paths}
     for name in select:
         if name not in by_name:
-            raise InputError(f"no such design (there are {', '.join(by_name)})", source=folder, field="designs",
-                             value=name)
+            raise InputError(
+                f"no such design (there are {', '.join(by_name)})",
+                source=folder,
+                field="designs",
+                value=name,
+            )
     if not select or len(set(select)) < len(select):
-        raise InputError("expected one or more different designs", source=folder, field="designs", value=list(select))
+        raise InputError(
+            "expected one or more different designs",
+            source=folder,
+            field="designs",
+            value=list(select),
+        )
     return [by_name[name] for name in select]
 
 
@@ -111,5 +118,8 @@ def _stem(path: Path) -> str:
 
 def _natural(path: Path) -> list[tuple[bool, int | str]]:
     """Sort key under which the numbers in names count as numbers."""
-    return [(piece.isdigit(), int(piece) if piece.isdigit() else piece)
-            for piece in re.split(r"([0-9]+)", _stem(path)) if piece]
+    return [
+        (piece.isdigit(), int(piece) if piece.isdigit() else piece)
+        for piece in re.split(r"([0-9]+)", _stem(path))
+        if piece
+    ]

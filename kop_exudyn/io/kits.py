@@ -1,11 +1,13 @@
-"""Kit files: JSON in the format "kop_exudyn/kit", to project other designs onto a kit that exists."""
+"""Kit files: JSON in the format "kop_exudyn/kit", to project other designs onto a kit that
+exists."""
+
 from __future__ import annotations
 
 from pathlib import Path
 
+from ..files.documents import check_envelope, check_schema
+from ..files.json_files import read_json, write_json
 from ..kit.parts import Kit
-from .documents import check_envelope, check_schema
-from .json_files import read_json, write_json
 
 KIT_VERSION = 1
 
@@ -19,6 +21,7 @@ def load_kit(path: str | Path) -> Kit:
 
 
 def save_kit(path: str | Path, kit: Kit, *, overwrite: bool = False) -> Path:
-    """Write a kit, exactly: `load_kit` gives the same numbers. InputError when the file exists or can't be written."""
+    """Write a kit, exactly: `load_kit` gives the same numbers. InputError when the file exists or
+    can't be written."""
     data = {"format": "kop_exudyn/kit", "version": KIT_VERSION, "parts": kit.to_dict()}
     return write_json(path, data, overwrite=overwrite)

@@ -1,16 +1,19 @@
-"""Result files: what a kit optimisation found, as JSON that other programs read, and its states as arrays."""
+"""Result files: what a kit optimisation found, as JSON that other programs read, and its states as
+arrays."""
+
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Mapping
+from typing import Any
 
 import numpy as np
 
 from ..equilibrium.newton import Equilibrium
 from ..errors import InputError
-from .arrays import load_arrays, save_arrays
-from .documents import check_envelope, check_schema
-from .json_files import plain, read_json, write_json
+from ..files.arrays import load_arrays, save_arrays
+from ..files.documents import check_envelope, check_schema
+from ..files.json_files import plain, read_json, write_json
 
 RESULT_VERSION = 1
 
@@ -18,7 +21,8 @@ RESULT_VERSION = 1
 def save_result(path: str | Path, result: Mapping[str, Any], *, overwrite: bool = False) -> Path:
     """Write `KitResult.to_dict()` with the format's name and version in front.
 
-    Raises InputError when the file exists already or can't be written, ValueError when the content isn't a result.
+    Raises InputError when the file exists already or can't be written, ValueError when the content
+    isn't a result.
     """
     data = {"format": "kop_exudyn/result", "version": RESULT_VERSION, **plain(result)}
     try:
@@ -36,24 +40,32 @@ def load_result(path: str | Path) -> dict[str, Any]:
     return data
 
 
-def save_states(path: str | Path, found: Mapping[tuple[str, str, str], Equilibrium], *,
-                overwrite: bool = False) -> Path:
-    """Write states as one .npz file: entries ``DESIGN/STAGE/ROLE/positions``, ``.../rotations``, ``.../angles``,
-    ``.../parameters`` (q) and ``.../torque`` (the actuation's multiplier, one number).
+def save_states(
+    path: str | Path, found: Mapping[tuple[str, str, str], Equilibrium], *, overwrite: bool = False
+) -> Path:
+    """Write states as one .npz file: entries ``DESIGN/STAGE/ROLE/positions``, ``.../rotations``,
+    ``.../angles``, ``.../parameters`` (q) and ``.../torque`` (the actuation's multiplier, one
+    number).
 
     found : (design, stage, role) -> equilibrium
     """
     arrays: dict[str, np.ndarray] = {}
     for key, equilibrium in found.items():
         state = equilibrium.state
-        values = {"positions": state.positions, "rotations": state.rotations, "angles": state.angles,
-                  "parameters": equilibrium.q, "torque": np.array(equilibrium.torque)}
+        values = {
+            "positions": state.positions,
+            "rotations": state.rotations,
+            "angles": state.angles,
+            "parameters": equilibrium.q,
+            "torque": np.array(equilibrium.torque),
+        }
         arrays |= {"/".join([*key, field]): array for field, array in values.items()}
     return save_arrays(path, arrays, overwrite=overwrite)
 
 
 def load_states(path: str | Path) -> dict[tuple[str, str, str], dict[str, np.ndarray]]:
-    """What `save_states` wrote: (design, stage, role) -> {"positions", "rotations", "angles", "parameters", "torque"}.
+    """What `save_states` wrote: (design, stage, role) -> {"positions", "rotations", "angles",
+    "parameters", "torque"}.
 
     Files of earlier versions lack the last two.
     """

@@ -1,4 +1,6 @@
-"""The folder that a long run writes to: prepared before it starts, so that no result is lost by chance."""
+"""The folder that a long run writes to: prepared before it starts, so that no result is lost by
+chance."""
+
 from __future__ import annotations
 
 import logging
@@ -6,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError
+from ..files.files import is_temporary, make_folder
 from .checkpoint import CheckpointStore, Job
-from .files import is_temporary, make_folder
 
 log = logging.getLogger(__name__)
 
@@ -26,13 +28,16 @@ class RunFolder:
     store: CheckpointStore
 
     @classmethod
-    def open(cls, path: str | Path, job: Job, *, resume: bool = False, overwrite: bool = False) -> RunFolder:
+    def open(
+        cls, path: str | Path, job: Job, *, resume: bool = False, overwrite: bool = False
+    ) -> RunFolder:
         """Prepare a new or empty folder, or one that an earlier run of the same job left.
 
         resume : go on from the checkpoints there, if there are any
         overwrite : also take a folder that a different job wrote, or that holds something else
 
-        Raises InputError when the folder can't be written to, or belongs to something else and `overwrite` is false.
+        Raises InputError when the folder can't be written to, or belongs to something else and
+        `overwrite` is false.
         """
         path = make_folder(path)
         record = path / _CHECKPOINTS / "job.json"
@@ -54,9 +59,16 @@ def _check_free(path: Path, record: Path, job: Job) -> None:
     if not content:
         return
     if not record.exists():
-        raise InputError("the folder isn't empty and wasn't written by an earlier run: choose another or allow "
-                         "overwriting", source=path)
+        raise InputError(
+            "the folder isn't empty and wasn't written by an earlier run: choose another or allow "
+            "overwriting",
+            source=path,
+        )
     difference = Job.load(record).difference(job)
     if difference is not None:
-        raise InputError(f"the folder holds the results of a different job ({difference}): choose another or allow "
-                         "overwriting", source=path)
+        raise InputError(
+            f"the folder holds the results of a different job ({difference}): choose another or "
+            f"allow "
+            "overwriting",
+            source=path,
+        )

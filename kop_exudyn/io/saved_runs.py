@@ -1,19 +1,22 @@
-"""Results of finished runs, read back from their folder: what `kop export` and `kop view` work on."""
+"""Results of finished runs, read back from their folder: what `kop export` and `kop view` work
+on."""
+
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from ..analysis.kit_result import INPUT, REDEPLOYED, STAGES, KitResult
 from ..equilibrium.newton import Equilibrium, Start, solve
 from ..errors import InputError, SimulationFailure
 from ..kit.parts import Assignment, Kit
-from ..optimize.events import events_from_list
-from ..optimize.objective import DesignObjective, Evaluation, Reference, Weights, reference_of
-from ..optimize.stage_results import Jump, StageEvent, StageResult
 from ..scene.state import State
+from ..search.events import events_from_list
+from ..search.objective import DesignObjective, Evaluation, Reference, Weights, reference_of
+from ..search.result import INPUT, REDEPLOYED, STAGES, KitResult
+from ..search.stage_results import Jump, StageEvent, StageResult
 from ..structures.base import Design, Role
 from .results import load_result, load_states
 
@@ -24,15 +27,17 @@ _SAME_PLACE = 1e-6  # of the size: how near a saved state is to the equilibrium 
 
 
 def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
-    """A run's result, from result.json and states.npz in its folder and the designs that it was made for.
+    """A run's result, from result.json and states.npz in its folder and the designs that it was
+    made for.
 
-    designs : those of the run, in any order; there may be others among them
-    Saved states are checked by a solve that starts from them, and confirmed by Exudyn. Folders of earlier versions have
-    neither the input designs' states, which are then simulated again, nor the parameters of stages before the last one,
-    which are then left out; nor the states that the assigned designs open into, nor the history.
+    designs : those of the run, in any order; there may be others among them Saved states are
+    checked by a solve that starts from them, and confirmed by Exudyn. Folders of earlier versions
+    have neither the input designs' states, which are then simulated again, nor the parameters of
+    stages before the last one, which are then left out; nor the states that the assigned designs
+    open into, nor the history.
 
-    Raises InputError when the files are damaged or belong to other designs, SimulationFailure when an input design
-    can't be simulated.
+    Raises InputError when the files are damaged or belong to other designs, SimulationFailure when
+    an input design can't be simulated.
     """
     folder = Path(folder)
     path = folder / "result.json"
@@ -40,26 +45,54 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
     designs = _named(designs, [design["name"] for design in data["designs"]], path)
     kit = Kit.from_dict(data["kit"], source=str(path))
     offsets = np.cumsum([0, *(len(design.parameters) for design in designs)])
-    groups = [group.shifted(start) for design, start in zip(designs, offsets) for group in design.groups]
-    assignment = Assignment.from_dict(data["assignment"], groups, int(offsets[-1]), kit, source=str(path))
+    groups = [
+        group.shifted(start) for design, start in zip(designs, offsets) for group in design.groups
+    ]
+    assignment = Assignment.from_dict(
+        data["assignment"], groups, int(offsets[-1]), kit, source=str(path)
+    )
     realised = np.split(assignment.matrix(kit) @ kit.vector, offsets[1:-1])
     references = [_reference(design, states) for design in designs]
     weights = _weights(data["settings"], designs)
-    objectives = [DesignObjective(design, weights, reference=reference)
-                  for design, reference in zip(designs, references)]
-    result = KitResult(list(designs), references, {}, settings=data["settings"], equilibria=data["equilibria"],
-                       newton_iterations=data["newton_iterations"], wall_s=data["wall_s"],
-                       peak_memory_mb=data["peak_memory_mb"], events=_history(data, path))
+    objectives = [
+        DesignObjective(design, weights, reference=reference)
+        for design, reference in zip(designs, references)
+    ]
+    result = KitResult(
+        list(designs),
+        references,
+        {},
+        settings=data["settings"],
+        equilibria=data["equilibria"],
+        newton_iterations=data["newton_iterations"],
+        wall_s=data["wall_s"],
+        peak_memory_mb=data["peak_memory_mb"],
+        events=_history(data, path),
+    )
     for stage in STAGES:
-        outcomes = [_outcome(objective, stage, states, entry, q if stage == _LAST else None)
-                    for objective, entry, q in zip(objectives, data["designs"], realised)]
+        outcomes = [
+            _outcome(objective, stage, states, entry, q if stage == _LAST else None)
+            for objective, entry, q in zip(objectives, data["designs"], realised)
+        ]
         if (found := _all(outcomes)) is not None:
-            result.stages[stage] = StageResult(found, kit, assignment, data["steps"].get(stage, 0),
-                                               data.get("objective", {}).get(stage),
-                                               data.get("status", {}).get(stage, ""),
-                                               _jumps(data, stage))
-    result.redeployed = _all([_opened(objective, states, entry, q)
-                              for objective, entry, q in zip(objectives, data["designs"], realised)]) or ()
+            result.stages[stage] = StageResult(
+                found,
+                kit,
+                assignment,
+                data["steps"].get(stage, 0),
+                data.get("objective", {}).get(stage),
+                data.get("status", {}).get(stage, ""),
+                _jumps(data, stage),
+            )
+    result.redeployed = (
+        _all(
+            [
+                _opened(objective, states, entry, q)
+                for objective, entry, q in zip(objectives, data["designs"], realised)
+            ]
+        )
+        or ()
+    )
     return result
 
 
@@ -85,8 +118,11 @@ def _history(data: Mapping[str, Any], path: Path) -> list[StageEvent]:
 
 def _jumps(data: Mapping[str, Any], stage: str) -> list[Jump]:
     """The snaps before a stage; files of earlier versions don't tell of which stage theirs are."""
-    return [Jump(jump["design"], jump["fraction"], jump["distance_percent"] / 100)
-            for jump in data.get("jumps", []) if jump.get("stage") == stage]
+    return [
+        Jump(jump["design"], jump["fraction"], jump["distance_percent"] / 100)
+        for jump in data.get("jumps", [])
+        if jump.get("stage") == stage
+    ]
 
 
 def _named(designs: Sequence[Design], names: Sequence[str], path: Path) -> list[Design]:
@@ -94,30 +130,49 @@ def _named(designs: Sequence[Design], names: Sequence[str], path: Path) -> list[
     found = [[design for design in designs if design.name == name] for name in names]
     missing = [name for name, same in zip(names, found) if len(same) != 1]
     if missing:
-        raise InputError(f"is of designs that aren't there, or not only once: {', '.join(missing)}", source=path,
-                         field="designs", value=[design.name for design in designs])
+        raise InputError(
+            f"is of designs that aren't there, or not only once: {', '.join(missing)}",
+            source=path,
+            field="designs",
+            value=[design.name for design in designs],
+        )
     return [same[0] for same in found]
 
 
-def _outcome(objective: DesignObjective, stage: str, states: Mapping[tuple[str, str, str], Any],
-             entry: Mapping[str, Any], q: np.ndarray | None) -> Evaluation | SimulationFailure | None:
-    """The objective's design after a stage, confirmed by Exudyn; None when the files don't say enough."""
+def _outcome(
+    objective: DesignObjective,
+    stage: str,
+    states: Mapping[tuple[str, str, str], Any],
+    entry: Mapping[str, Any],
+    q: np.ndarray | None,
+) -> Evaluation | SimulationFailure | None:
+    """The objective's design after a stage, confirmed by Exudyn; None when the files don't say
+    enough."""
     if "failed" in entry.get(stage, {}):
         return SimulationFailure(entry[stage]["failed"])
     found = _judged(objective, stage, states, q)
     return None if found is None else objective.confirm(found)
 
 
-def _opened(objective: DesignObjective, states: Mapping[tuple[str, str, str], Any], entry: Mapping[str, Any],
-            q: np.ndarray) -> Evaluation | SimulationFailure | None:
-    """The state that the assigned design opens into from its assembly; None when the files don't have it."""
+def _opened(
+    objective: DesignObjective,
+    states: Mapping[tuple[str, str, str], Any],
+    entry: Mapping[str, Any],
+    q: np.ndarray,
+) -> Evaluation | SimulationFailure | None:
+    """The state that the assigned design opens into from its assembly; None when the files don't
+    have it."""
     if "failed" in entry.get(REDEPLOYED, {}):
         return SimulationFailure(entry[REDEPLOYED]["failed"])
     return _judged(objective, REDEPLOYED, states, q)
 
 
-def _judged(objective: DesignObjective, stage: str, states: Mapping[tuple[str, str, str], Any],
-            q: np.ndarray | None) -> Evaluation | None:
+def _judged(
+    objective: DesignObjective,
+    stage: str,
+    states: Mapping[tuple[str, str, str], Any],
+    q: np.ndarray | None,
+) -> Evaluation | None:
     """The objective at a stage's saved states."""
     design = objective.design
     saved = _saved(design, stage, states)
@@ -126,7 +181,9 @@ def _judged(objective: DesignObjective, stage: str, states: Mapping[tuple[str, s
     q = next(iter(saved.values())).get("parameters", q)
     if q is None:
         return None
-    equilibria = {role.name: _equilibrium(design, role, stage, q, saved[role.name]) for role in design.roles}
+    equilibria = {
+        role.name: _equilibrium(design, role, stage, q, saved[role.name]) for role in design.roles
+    }
     return objective.judge(q, equilibria)
 
 
@@ -135,25 +192,43 @@ def _reference(design: Design, states: Mapping[tuple[str, str, str], Any]) -> Re
     saved = _saved(design, INPUT, states)
     if saved is None:
         return reference_of(design)
-    equilibria = {role.name: _equilibrium(design, role, INPUT, design.parameters, saved[role.name])
-                  for role in design.roles}
+    equilibria = {
+        role.name: _equilibrium(design, role, INPUT, design.parameters, saved[role.name])
+        for role in design.roles
+    }
     return Reference(design.target, equilibria[design.fitted_role.name].elastic_energy, equilibria)
 
 
-def _saved(design: Design, stage: str, states: Mapping[tuple[str, str, str], Any]) -> dict[str, Any] | None:
+def _saved(
+    design: Design, stage: str, states: Mapping[tuple[str, str, str], Any]
+) -> dict[str, Any] | None:
     """The saved arrays of a design's states by role, where there are all of them."""
-    found = {role.name: states[key] for role in design.roles if (key := (design.name, stage, role.name)) in states}
+    found = {
+        role.name: states[key]
+        for role in design.roles
+        if (key := (design.name, stage, role.name)) in states
+    }
     return found if len(found) == len(design.roles) else None
 
 
-def _equilibrium(design: Design, role: Role, stage: str, q: np.ndarray, saved: Mapping[str, np.ndarray]) -> Equilibrium:
+def _equilibrium(
+    design: Design, role: Role, stage: str, q: np.ndarray, saved: Mapping[str, np.ndarray]
+) -> Equilibrium:
     """The equilibrium that a saved state is; InputError where it is none of this design."""
     state = State(*(saved[field] for field in ("positions", "rotations", "angles")))
     scene = design.scene(role.name)
     sizes = (scene.n_bodies, scene.n_hinges, len(design.parameters))
     if (len(state.positions), len(state.angles), len(q)) != sizes:
-        raise InputError("the saved states are of another version of this design", source=design.name, field=stage)
-    found = solve(design.systems[role.name], q, Start(state, float(saved.get("torque", 0.0))), role.opening)
+        raise InputError(
+            "the saved states are of another version of this design",
+            source=design.name,
+            field=stage,
+        )
+    found = solve(
+        design.systems[role.name], q, Start(state, float(saved.get("torque", 0.0))), role.opening
+    )
     if np.abs(found.state.positions - state.positions).max() > _SAME_PLACE * scene.size:
-        raise InputError("the saved states are no equilibria of this design", source=design.name, field=stage)
+        raise InputError(
+            "the saved states are no equilibria of this design", source=design.name, field=stage
+        )
     return found

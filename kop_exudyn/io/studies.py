@@ -1,23 +1,26 @@
-"""Study files: TOML in the format "kop_exudyn/study", which says for what designs a kit is sought, and how."""
+"""Study files: TOML in the format "kop_exudyn/study", which says for what designs a kit is sought,
+and how."""
+
 from __future__ import annotations
 
 import os
 import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
+from ..files.documents import check_envelope, check_range, check_schema
+from ..files.files import read_bytes
 from ..kit.kinds import Bounds
-from ..optimize.job import JobSettings
-from ..optimize.objective import Weights
-from ..optimize.stage_settings import StageSettings
+from ..search.job import JobSettings
+from ..search.objective import Weights
+from ..search.settings import StageSettings
 from ..structures.base import Design
 from .designs import design_files, load_all, select_among
-from .documents import check_envelope, check_range, check_schema
-from .files import read_bytes
 
 STUDY_VERSION = 1
 STUDY_SUFFIX = ".toml"
@@ -49,7 +52,8 @@ class Study:
         return load_all(self.files, self.source)
 
     def job_settings(self, designs: Sequence[Design], jobs: int) -> JobSettings:
-        """Settings of a job for these designs, which are the study's own, with that many processes."""
+        """Settings of a job for these designs, which are the study's own, with that many
+        processes."""
         weights = Weights.suiting(designs, self.weights) if self.weights else None
         counts = self.counts if set(self.counts) - {1.0} else None
         return JobSettings(weights, counts, self.settings, jobs, self.baselines)
@@ -60,14 +64,22 @@ def load_study(path: str | Path, select: int | Sequence[str] | None = None) -> S
 
     select : of the designs, as for `load_designs`
 
-    Raises InputError naming the file, the field and the value when anything is wrong; designs aren't read yet.
+    Raises InputError naming the file, the field and the value when anything is wrong; designs
+    aren't read yet.
     """
     path = Path(path)
     study = _from_file(path) if is_study(path) else Study(path, tuple(design_files(path)))
     files = tuple(select_among(study.files, select, path))
     counts = dict(zip(study.files, study.counts or (1.0,) * len(study.files)))
-    return Study(path, files, study.parts, study.weights, tuple(counts[file] for file in files), study.settings,
-                 study.baselines)
+    return Study(
+        path,
+        files,
+        study.parts,
+        study.weights,
+        tuple(counts[file] for file in files),
+        study.settings,
+        study.baselines,
+    )
 
 
 def is_study(path: str | Path) -> bool:
@@ -83,7 +95,9 @@ def _from_file(path: Path) -> Study:
     check_schema(data, "study", source=path)
     weights = data.get("weights", {})
     if weights.get("fit") == 0 and weights.get("energy") == 0:
-        raise InputError("fit and energy can't both be 0", source=path, field="weights", value=weights)
+        raise InputError(
+            "fit and energy can't both be 0", source=path, field="weights", value=weights
+        )
     try:
         Weights.of(weights)
     except InputError as error:
@@ -94,8 +108,15 @@ def _from_file(path: Path) -> Study:
         settings["schedule"] = tuple(settings["schedule"])
     if "bounds" in settings:
         settings["bounds"] = _bounds(settings["bounds"])
-    return Study(path, tuple(counts), data.get("parts", {}), weights, tuple(counts.values()),
-                 StageSettings(**settings), data.get("baselines", True))
+    return Study(
+        path,
+        tuple(counts),
+        data.get("parts", {}),
+        weights,
+        tuple(counts.values()),
+        StageSettings(**settings),
+        data.get("baselines", True),
+    )
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
@@ -111,19 +132,34 @@ def _files(entries: Sequence[str | Mapping[str, Any]], path: Path) -> dict[Path,
     """Design files with their weights, in order; folders stand for all designs in them."""
     found: dict[Path, float] = {}
     for n, entry in enumerate(entries):
-        name, weight = (entry, 1.0) if isinstance(entry, str) else (entry["file"], float(entry.get("weight", 1.0)))
+        name, weight = (
+            (entry, 1.0)
+            if isinstance(entry, str)
+            else (entry["file"], float(entry.get("weight", 1.0)))
+        )
         place = path.parent / name
         if not os.path.exists(place):
-            raise InputError("no such file or folder", source=path, field=f"designs[{n}]", value=name)
+            raise InputError(
+                "no such file or folder", source=path, field=f"designs[{n}]", value=name
+            )
         for file in design_files(place) if os.path.isdir(place) else [place]:
             if file.name in {other.name for other in found}:
-                raise InputError("two design files have the same name", source=path, field=f"designs[{n}]",
-                                 value=file.name)
+                raise InputError(
+                    "two design files have the same name",
+                    source=path,
+                    field=f"designs[{n}]",
+                    value=file.name,
+                )
             found[file] = weight
     return found
 
 
 def _bounds(data: Mapping[str, Mapping[str, Any]]) -> Bounds:
     """By kind (lower, upper); what isn't given is no bound."""
-    return {kind: tuple(np.array(given.get(side, none), float) for side, none in (("lower", -np.inf), ("upper", np.inf)))
-            for kind, given in data.items()}
+    return {
+        kind: tuple(
+            np.array(given.get(side, none), float)
+            for side, none in (("lower", -np.inf), ("upper", np.inf))
+        )
+        for kind, given in data.items()
+    }

@@ -1,19 +1,21 @@
 """Cluster elements into parts: k-means over (part, variant), started by D^2 sampling (k-means++).
 
-Arthur and Vassilvitskii, "k-means++: the advantages of careful seeding" (SODA 2007); distances are those of an element
-to the best variant of a part. End elements take part in the clustering and use one side of a linear part.
+Arthur and Vassilvitskii, "k-means++: the advantages of careful seeding" (SODA 2007); distances are
+those of an element to the best variant of a part. End elements take part in the clustering and use
+one side of a linear part.
 """
+
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Mapping, Sequence
 
 import numpy as np
 
 from ..errors import InputError
-from ..structures.base import ElementGroup
 from .assign import to_assignment
 from .elements import KindElements, Labels, Penalties, collect
+from .groups import ElementGroup
 from .kinds import Bounds, part_kind
 from .parts import Assignment, Kit
 
@@ -22,15 +24,24 @@ _MAX_ITERATIONS = 300
 
 @dataclass(frozen=True)
 class Clustering:
-    """A kit, the nearest assignment to it, and by kind the mean of half the squared relative distances."""
+    """A kit, the nearest assignment to it, and by kind the mean of half the squared relative
+    distances."""
 
     kit: Kit
     assignment: Assignment
     energy: dict[str, float]
 
 
-def cluster(groups: Sequence[ElementGroup], q: np.ndarray, parts: Mapping[str, int], *, bounds: Bounds | None = None,
-            restarts: int = 20, seed: int = 0, penalties: Penalties | None = None) -> Clustering:
+def cluster(
+    groups: Sequence[ElementGroup],
+    q: np.ndarray,
+    parts: Mapping[str, int],
+    *,
+    bounds: Bounds | None = None,
+    restarts: int = 20,
+    seed: int = 0,
+    penalties: Penalties | None = None,
+) -> Clustering:
     """The best kit of several seeded k-means runs.
 
     q : (n_q,) parameters that the groups index
@@ -38,8 +49,9 @@ def cluster(groups: Sequence[ElementGroup], q: np.ndarray, parts: Mapping[str, i
     bounds : kind -> (lower, upper) of the parts' parameters, besides the natural ones
     penalties : kind -> weights of the parts' own energy, for kinds such as "slit"
 
-    Parts come in canonical form and sorted; where there are fewer distinct elements than parts, parts repeat.
-    Raises InputError for more parts than elements, kinds without a number of parts or without elements, empty bounds.
+    Parts come in canonical form and sorted; where there are fewer distinct elements than parts,
+    parts repeat. Raises InputError for more parts than elements, kinds without a number of parts or
+    without elements, empty bounds.
     """
     elements = collect(groups, q, penalties=penalties)
     _check_request(elements, parts)
@@ -48,7 +60,10 @@ def cluster(groups: Sequence[ElementGroup], q: np.ndarray, parts: Mapping[str, i
     found, labels, energy = {}, {}, {}
     for name, e in elements.items():
         limits = e.kind.bounds(bounds)
-        runs = [_run(e, parts[name], limits, np.random.default_rng([seed, run])) for run in range(max(restarts, 1))]
+        runs = [
+            _run(e, parts[name], limits, np.random.default_rng([seed, run]))
+            for run in range(max(restarts, 1))
+        ]
         best = min(runs, key=lambda run: e.energy(*run))[0]
         canonical = e.kind.canonical(best)
         found[name] = canonical[np.lexsort(canonical.T[::-1])]
@@ -57,7 +72,9 @@ def cluster(groups: Sequence[ElementGroup], q: np.ndarray, parts: Mapping[str, i
     return Clustering(Kit(found), to_assignment(groups, len(q), elements, labels), energy)
 
 
-def lloyd(elements: KindElements, parts: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, Labels]:
+def lloyd(
+    elements: KindElements, parts: np.ndarray, lower: np.ndarray, upper: np.ndarray
+) -> tuple[np.ndarray, Labels]:
     """Alternate nearest labels and best parts from parts (m, k_p) until neither changes.
 
     Returns parts that are best for the labels, and the labels. The energy never increases.
@@ -72,17 +89,21 @@ def lloyd(elements: KindElements, parts: np.ndarray, lower: np.ndarray, upper: n
         still = elements.exact or np.abs(moved - parts).max() <= 1e-13 * elements.scale
         settled = still and new_labels.same(labels)
         if settled or new_energy >= energy:
-            # Without a decrease the labels differ by ties or round-off only: the parts must fit the labels returned.
+            # Without a decrease the labels differ by ties or round-off only: the parts must fit the
+            # labels returned.
             return better, _measured(elements, better, labels)
         parts, labels, energy = moved, new_labels, new_energy
     return parts, labels
 
 
-def best_parts(elements: KindElements, parts: np.ndarray, labels: Labels, lower: np.ndarray,
-               upper: np.ndarray) -> np.ndarray:
-    """(m, k_p) least-squares parts for these labels; parameters that no element uses stay as they are in `parts`.
+def best_parts(
+    elements: KindElements, parts: np.ndarray, labels: Labels, lower: np.ndarray, upper: np.ndarray
+) -> np.ndarray:
+    """(m, k_p) least-squares parts for these labels; parameters that no element uses stay as they
+    are in `parts`.
 
-    With interval parts the energy is only piecewise quadratic: then one safeguarded Newton step towards them.
+    With interval parts the energy is only piecewise quadratic: then one safeguarded Newton step
+    towards them.
     """
     normal, right = elements.normal_equations(parts, labels)
     if elements.exact:
@@ -92,16 +113,28 @@ def best_parts(elements: KindElements, parts: np.ndarray, labels: Labels, lower:
     return _newton_step(elements, parts, labels, normal, right, (lower, upper))
 
 
-def _newton_step(elements: KindElements, parts: np.ndarray, labels: Labels, normal: np.ndarray, right: np.ndarray,
-                 limits: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """Minimise the present quadratic piece within the bounds, halving the step while the energy rises."""
+def _newton_step(
+    elements: KindElements,
+    parts: np.ndarray,
+    labels: Labels,
+    normal: np.ndarray,
+    right: np.ndarray,
+    limits: tuple[np.ndarray, np.ndarray],
+) -> np.ndarray:
+    """Minimise the present quadratic piece within the bounds, halving the step while the energy
+    rises."""
     gradient = np.einsum("mkl,ml->mk", normal, parts) - right
     free = ~((parts <= limits[0]) & (gradient > 0) | (parts >= limits[1]) & (gradient < 0))
     goal = parts
     for _ in range(parts.shape[1]):  # each round fixes the parameters that run into a bound
         held = np.where(free, 0.0, goal - parts)
         rhs = np.where(free, -(gradient + np.einsum("mkl,ml->mk", normal, held)), 0.0)
-        step = np.einsum("mkl,ml->mk", np.linalg.pinv(normal * free[:, :, None] * free[:, None, :]), rhs) + held
+        step = (
+            np.einsum(
+                "mkl,ml->mk", np.linalg.pinv(normal * free[:, :, None] * free[:, None, :]), rhs
+            )
+            + held
+        )
         goal = np.clip(parts + step, *limits)
         free &= goal == parts + step
     before = elements.energy(parts, _measured(elements, parts, labels))
@@ -122,20 +155,24 @@ def _measured(elements: KindElements, parts: np.ndarray, labels: Labels) -> Labe
     return replace(labels, squared=squared)
 
 
-def _run(elements: KindElements, m: int, limits: tuple[np.ndarray, np.ndarray],
-         rng: np.random.Generator) -> tuple[np.ndarray, Labels]:
+def _run(
+    elements: KindElements, m: int, limits: tuple[np.ndarray, np.ndarray], rng: np.random.Generator
+) -> tuple[np.ndarray, Labels]:
     return lloyd(elements, _sample_parts(elements, m, limits, rng), *limits)
 
 
-def _sample_parts(elements: KindElements, m: int, limits: tuple[np.ndarray, np.ndarray],
-                  rng: np.random.Generator) -> np.ndarray:
-    """(m, k_p) k-means++ start: each next part at an element drawn with probability ~ its squared distance so far."""
+def _sample_parts(
+    elements: KindElements, m: int, limits: tuple[np.ndarray, np.ndarray], rng: np.random.Generator
+) -> np.ndarray:
+    """(m, k_p) k-means++ start: each next part at an element drawn with probability ~ its squared
+    distance so far."""
     first = int(rng.integers(len(elements.blocks[0].values)))
     parts = [np.clip(elements.lift(first), *limits)]
     squared, owner = elements.nearest(parts[0][None]).squared, np.zeros(elements.n, dtype=int)
     while len(parts) < m:
         total = squared.sum()
-        if squared.max() <= (1e-12 * elements.scale) ** 2:  # all distinct elements have their part: repeat parts
+        # all distinct elements have their part: repeat parts
+        if squared.max() <= (1e-12 * elements.scale) ** 2:
             parts.append(parts[len(parts) % len(np.unique(owner))])
             continue
         chosen = int(rng.choice(elements.n, p=squared / total))
@@ -146,8 +183,9 @@ def _sample_parts(elements: KindElements, m: int, limits: tuple[np.ndarray, np.n
     return np.array(parts)
 
 
-def _repair(elements: KindElements, parts: np.ndarray, labels: Labels, lower: np.ndarray,
-            upper: np.ndarray) -> tuple[np.ndarray, Labels]:
+def _repair(
+    elements: KindElements, parts: np.ndarray, labels: Labels, lower: np.ndarray, upper: np.ndarray
+) -> tuple[np.ndarray, Labels]:
     """Move parts that serve no element to the worst served one, as long as that helps."""
     for _ in range(len(parts)):
         empty = np.flatnonzero(np.bincount(labels.part, minlength=len(parts)) == 0)
@@ -167,11 +205,19 @@ def _check_request(elements: Mapping[str, KindElements], parts: Mapping[str, int
     for name, count in parts.items():
         part_kind(name)
         if name not in elements:
-            raise InputError("the designs have no elements of this kind", field=f"parts.{name}", value=count)
+            raise InputError(
+                "the designs have no elements of this kind", field=f"parts.{name}", value=count
+            )
         if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
-            raise InputError("expected a whole number of parts, at least 1", field=f"parts.{name}", value=count)
+            raise InputError(
+                "expected a whole number of parts, at least 1", field=f"parts.{name}", value=count
+            )
         if count > elements[name].n:
-            raise InputError(f"more parts than elements ({elements[name].n})", field=f"parts.{name}", value=count)
+            raise InputError(
+                f"more parts than elements ({elements[name].n})", field=f"parts.{name}", value=count
+            )
     for name in elements:
         if name not in parts:
-            raise InputError("the designs have elements of this kind: say how many parts", field=f"parts.{name}")
+            raise InputError(
+                "the designs have elements of this kind: say how many parts", field=f"parts.{name}"
+            )

@@ -1,13 +1,15 @@
-"""The elements of one kind, of all designs together: distances to parts, best parts, and their energy."""
+"""The elements of one kind, of all designs together: distances to parts, best parts, and their
+energy."""
+
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Mapping, Sequence
 
 import numpy as np
 
 from ..errors import InputError
-from ..structures.base import ElementGroup
+from .groups import ElementGroup
 from .kinds import PartKind, Variants, part_kind
 
 Penalties = Mapping[str, Sequence[float]]  # kind -> (k_p,) weights that replace the kind's own
@@ -32,7 +34,9 @@ class Block:
     variants: Variants
     values: np.ndarray
 
-    def contact(self, parts: np.ndarray, labels: Labels, span: slice) -> tuple[np.ndarray, np.ndarray]:
+    def contact(
+        self, parts: np.ndarray, labels: Labels, span: slice
+    ) -> tuple[np.ndarray, np.ndarray]:
         """See `Variants.contact`."""
         return self.variants.contact(self.values, labels.variant[span], parts[labels.part[span]])
 
@@ -74,9 +78,15 @@ class KindElements:
         return Labels(*(np.concatenate(column) for column in zip(*found)))
 
     def costs(self, parts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Squared distance (n, m) of each element to each part in its best variant, and that variant (n, m)."""
-        squared = [np.sum(block.variants.residuals(block.values, parts) ** 2, axis=3) for block in self.blocks]
-        return np.concatenate([s.min(axis=2) for s in squared]), np.concatenate([s.argmin(axis=2) for s in squared])
+        """Squared distance (n, m) of each element to each part in its best variant, and that
+        variant (n, m)."""
+        squared = [
+            np.sum(block.variants.residuals(block.values, parts) ** 2, axis=3)
+            for block in self.blocks
+        ]
+        return np.concatenate([s.min(axis=2) for s in squared]), np.concatenate(
+            [s.argmin(axis=2) for s in squared]
+        )
 
     def energy(self, parts: np.ndarray, labels: Labels) -> float:
         """Mean of half the squared relative distances, plus the parts' penalty; dimensionless."""
@@ -84,18 +94,21 @@ class KindElements:
         return 0.5 * float(labels.squared.mean() + own) / self.scale**2
 
     def lift(self, element: int, near: np.ndarray | None = None) -> np.ndarray:
-        """(k_p,) a part in canonical form that realises this element, otherwise like the part `near` (k_p,)."""
+        """(k_p,) a part in canonical form that realises this element, otherwise like the part
+        `near` (k_p,)."""
         for block, span in zip(self.blocks, self.spans):
             if element < span.stop:
                 values = block.values[element - span.start][None]
-                return self.kind.canonical(block.variants.lift(values, None if near is None else near[None]))[0]
+                return self.kind.canonical(
+                    block.variants.lift(values, None if near is None else near[None])
+                )[0]
         raise IndexError(element)
 
     def normal_equations(self, parts: np.ndarray, labels: Labels) -> tuple[np.ndarray, np.ndarray]:
         """N (m, k_p, k_p) and b (m, k_p): the best parts for these labels solve N p = b.
 
-        Summed over the elements and multiplied by n scale^2. With interval parts, N and b hold for the contact at
-        `parts`, whose derivative N p - b is exact.
+        Summed over the elements and multiplied by n scale^2. With interval parts, N and b hold for
+        the contact at `parts`, whose derivative N p - b is exact.
         """
         m, k = parts.shape
         normal, right = np.zeros((m, k, k)), np.zeros((m, k))
@@ -110,14 +123,21 @@ class KindElements:
 
 def _nearest_in_block(block: Block, parts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     n_variants = len(block.variants.names)
-    squared = np.sum(block.variants.residuals(block.values, parts) ** 2, axis=3).reshape(len(block.values), -1)
+    squared = np.sum(block.variants.residuals(block.values, parts) ** 2, axis=3).reshape(
+        len(block.values), -1
+    )
     best = squared.argmin(axis=1)
     return best // n_variants, best % n_variants, squared[np.arange(len(best)), best]
 
 
-def collect(groups: Sequence[ElementGroup], q: np.ndarray, scales: Mapping[str, float] | None = None,
-            penalties: Penalties | None = None) -> dict[str, KindElements]:
-    """The elements by kind (alphabetical), from the groups and all parameters q (n_q,); empty groups are left out.
+def collect(
+    groups: Sequence[ElementGroup],
+    q: np.ndarray,
+    scales: Mapping[str, float] | None = None,
+    penalties: Penalties | None = None,
+) -> dict[str, KindElements]:
+    """The elements by kind (alphabetical), from the groups and all parameters q (n_q,); empty
+    groups are left out.
 
     scales : kind -> scale; by default those of q itself
     Raises InputError for unknown kinds, values that aren't finite and inputs without any extent.
@@ -130,20 +150,37 @@ def collect(groups: Sequence[ElementGroup], q: np.ndarray, scales: Mapping[str, 
         if not np.isfinite(q[group.indices]).all():
             raise InputError("element parameters must be finite numbers", field=group.kind)
         by_kind.setdefault(group.kind, {}).setdefault(group.indices.shape[1], []).append(number)
-    return {name: _kind_elements(name, by_kind[name], groups, q, scales, penalties or {}) for name in sorted(by_kind)}
+    return {
+        name: _kind_elements(name, by_kind[name], groups, q, scales, penalties or {})
+        for name in sorted(by_kind)
+    }
 
 
-def _kind_elements(name: str, by_size: Mapping[int, list[int]], groups: Sequence[ElementGroup], q: np.ndarray,
-                   scales: Mapping[str, float] | None, penalties: Penalties) -> KindElements:
+def _kind_elements(
+    name: str,
+    by_size: Mapping[int, list[int]],
+    groups: Sequence[ElementGroup],
+    q: np.ndarray,
+    scales: Mapping[str, float] | None,
+    penalties: Penalties,
+) -> KindElements:
     kind = part_kind(name)
     sizes = sorted(by_size, reverse=True)
-    values = [np.concatenate([q[groups[number].indices] for number in by_size[size]]) for size in sizes]
-    scale = kind.scale(np.concatenate([v.ravel() for v in values])) if scales is None else scales[name]
+    values = [
+        np.concatenate([q[groups[number].indices] for number in by_size[size]]) for size in sizes
+    ]
+    scale = (
+        kind.scale(np.concatenate([v.ravel() for v in values])) if scales is None else scales[name]
+    )
     if not scale > 0:
         raise InputError("the elements' median length must be positive", field=name, value=scale)
     own = np.zeros(kind.n_parameters) if kind.penalty is None else kind.penalty
-    penalty = np.broadcast_to(np.asarray(penalties.get(name, own), dtype=float), (kind.n_parameters,))
+    penalty = np.broadcast_to(
+        np.asarray(penalties.get(name, own), dtype=float), (kind.n_parameters,)
+    )
     if not np.all(penalty >= 0):
-        raise InputError("penalties can't be negative", field=f"penalties.{name}", value=penalty.tolist())
+        raise InputError(
+            "penalties can't be negative", field=f"penalties.{name}", value=penalty.tolist()
+        )
     blocks = tuple(Block(kind.variants_of(size), v) for size, v in zip(sizes, values))
     return KindElements(kind, blocks, tuple(tuple(by_size[size]) for size in sizes), scale, penalty)

@@ -1,14 +1,16 @@
 """Kinds of parts, and how a part realises an element.
 
-A kind is one module in this folder that registers a `PartKind`; nothing else has to change. All that the clustering,
-the assignment and the projection need is linear: an element of parameters q that part p realises in variant v should
-be q = V_v p with entries 0, 1 and -1 in V_v. Kinds that realise an interval instead of a value add a reach W_v >= 0:
-then every q in [V_v p, (V_v + W_v) p] is realised, and the distance is that to this box.
+A kind is one module in this folder that registers a `PartKind`; nothing else has to change. All
+that the clustering, the assignment and the projection need is linear: an element of parameters q
+that part p realises in variant v should be q = V_v p with entries 0, 1 and -1 in V_v. Kinds that
+realise an interval instead of a value add a reach W_v >= 0: then every q in [V_v p, (V_v + W_v) p]
+is realised, and the distance is that to this box.
 """
+
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -24,7 +26,8 @@ class Variants:
 
     names : n_v names
     matrices : (n_v, k_e, k_p) V, entries 0, 1 or -1
-    reach : (n_v, k_e, k_p) W >= 0, or None where a part realises exactly one element in each variant
+    reach : (n_v, k_e, k_p) W >= 0, or None where a part realises exactly one element in each
+        variant
     """
 
     names: tuple[str, ...]
@@ -32,9 +35,13 @@ class Variants:
     reach: np.ndarray | None = None
 
     @classmethod
-    def of(cls, names: tuple[str, ...], matrices: Sequence, reach: Sequence | None = None) -> Variants:
+    def of(
+        cls, names: tuple[str, ...], matrices: Sequence, reach: Sequence | None = None
+    ) -> Variants:
         """The same from nested lists."""
-        return cls(names, np.array(matrices, float), None if reach is None else np.array(reach, float))
+        return cls(
+            names, np.array(matrices, float), None if reach is None else np.array(reach, float)
+        )
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "matrices", np.asarray(self.matrices, dtype=float))
@@ -42,10 +49,13 @@ class Variants:
             object.__setattr__(self, "reach", np.asarray(self.reach, dtype=float))
         products = np.einsum("vek,vel->vkl", self.matrices, self.matrices)
         if not np.array_equal(products, products * np.eye(products.shape[1])):
-            raise ValueError("the parts' least-squares problem must be diagonal: one part parameter an element's")
+            raise ValueError(
+                "the parts' least-squares problem must be diagonal: one part parameter an element's"
+            )
 
     def residuals(self, elements: np.ndarray, parts: np.ndarray) -> np.ndarray:
-        """(n, m, n_v, k_e): elements (n, k_e) minus the nearest that each of the parts (m, k_p) realises."""
+        """(n, m, n_v, k_e): elements (n, k_e) minus the nearest that each of the parts (m, k_p)
+        realises."""
         nearest = np.einsum("vek,mk->mve", self.matrices, parts)
         difference = elements[:, None, None, :] - nearest
         if self.reach is None:
@@ -53,10 +63,14 @@ class Variants:
         width = np.einsum("vek,mk->mve", self.reach, parts)
         return difference - np.clip(difference, 0, width)
 
-    def contact(self, elements: np.ndarray, variant: np.ndarray, parts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The linear maps that the elements (n, k_e) are compared with, in variant (n,) of the parts (n, k_p).
+    def contact(
+        self, elements: np.ndarray, variant: np.ndarray, parts: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The linear maps that the elements (n, k_e) are compared with, in variant (n,) of the
+        parts (n, k_p).
 
-        Returns A (n, k_e, k_p) and active (n, k_e): the residual is q - A p where active, else zero.
+        Returns A (n, k_e, k_p) and active (n, k_e): the residual is q - A p where active, else
+        zero.
         """
         rows = self.matrices[variant]
         if self.reach is None:
@@ -68,10 +82,11 @@ class Variants:
         return rows + np.where(beyond[:, :, None], reach, 0.0), beyond | (difference < 0)
 
     def lift(self, elements: np.ndarray, near: np.ndarray | None = None) -> np.ndarray:
-        """(n, k_p) parts that realise the elements (n, k_e) exactly as they are (in the first variant).
+        """(n, k_p) parts that realise the elements (n, k_e) exactly as they are (in the first
+        variant).
 
-        What an element leaves open (the other side of an end element's part) is taken from the parts `near` (n, k_p),
-        without them from the element's other variants.
+        What an element leaves open (the other side of an end element's part) is taken from the
+        parts `near` (n, k_p), without them from the element's other variants.
         """
         first = np.linalg.pinv(self.matrices[0])
         if near is None:
@@ -89,7 +104,8 @@ class PartKind:
     canonical : parts (m, k_p) -> the same parts in their standard form
     lower, upper : (k_p,) natural bounds
     angular : whether the parameters are angles (scale 1) or lengths (scale: the inputs' median)
-    penalty : (k_p,) weights of 1/2 (p / scale)^2, averaged over the kind's parts, in the projection energy
+    penalty : (k_p,) weights of 1/2 (p / scale)^2, averaged over the kind's parts, in the projection
+        energy
     """
 
     name: str
@@ -106,29 +122,45 @@ class PartKind:
         return len(self.parameter_names)
 
     def variants_of(self, n_parameters: int) -> Variants:
-        """Variants for elements of that many parameters; InputError where this kind has no such elements."""
+        """Variants for elements of that many parameters; InputError where this kind has no such
+        elements."""
         if n_parameters not in self.variants:
             known = ", ".join(map(str, sorted(self.variants)))
-            raise InputError(f"{self.name} elements have {known} parameters", field="elements", value=n_parameters)
+            raise InputError(
+                f"{self.name} elements have {known} parameters",
+                field="elements",
+                value=n_parameters,
+            )
         return self.variants[n_parameters]
 
     def scale(self, values: np.ndarray) -> float:
-        """The length that makes this kind's distances dimensionless: median of the input elements' parameters."""
+        """The length that makes this kind's distances dimensionless: median of the input elements'
+        parameters."""
         return 1.0 if self.angular else float(np.median(np.abs(values)))
 
     def bounds(self, bounds: Bounds | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """(k_p,), (k_p,): the natural bounds, narrowed by the user's; InputError when nothing lies between them."""
+        """(k_p,), (k_p,): the natural bounds, narrowed by the user's; InputError when nothing lies
+        between them."""
         lower, upper = np.array(self.lower, dtype=float), np.array(self.upper, dtype=float)
         if bounds and self.name in bounds:
             try:
-                least, most = (np.broadcast_to(np.asarray(b, dtype=float), lower.shape) for b in bounds[self.name])
+                least, most = (
+                    np.broadcast_to(np.asarray(b, dtype=float), lower.shape)
+                    for b in bounds[self.name]
+                )
             except (TypeError, ValueError):
-                raise InputError(f"expected a lower and an upper bound, numbers or {len(lower)} of them each",
-                                 field=f"bounds.{self.name}", value=bounds[self.name]) from None
+                raise InputError(
+                    f"expected a lower and an upper bound, numbers or {len(lower)} of them each",
+                    field=f"bounds.{self.name}",
+                    value=bounds[self.name],
+                ) from None
             lower, upper = np.maximum(lower, least), np.minimum(upper, most)
         if not np.all(lower <= upper):
-            raise InputError("no part lies within these bounds", field=f"bounds.{self.name}",
-                             value=(lower.tolist(), upper.tolist()))
+            raise InputError(
+                "no part lies within these bounds",
+                field=f"bounds.{self.name}",
+                value=(lower.tolist(), upper.tolist()),
+            )
         return lower, upper
 
 
@@ -152,5 +184,9 @@ def part_kind(name: str) -> PartKind:
     if name not in _REGISTRY:
         load_folder(__package__)
     if name not in _REGISTRY:
-        raise InputError(f"unknown kind of parts (known: {', '.join(sorted(_REGISTRY))})", field="parts", value=name)
+        raise InputError(
+            f"unknown kind of parts (known: {', '.join(sorted(_REGISTRY))})",
+            field="parts",
+            value=name,
+        )
     return _REGISTRY[name]

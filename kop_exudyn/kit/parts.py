@@ -1,15 +1,17 @@
 """A kit of parts, and the assignment of elements to its parts."""
+
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..errors import InputError
-from ..structures.base import ElementGroup
+from .groups import ElementGroup
 from .kinds import PartKind, Variants, part_kind
 
 
@@ -17,9 +19,11 @@ from .kinds import PartKind, Variants, part_kind
 class Kit:
     """Parts by kind.
 
-    parts : kind -> (m, k_p) parameters of its parts; lengths in the designs' unit, angles in radians
+    parts : kind -> (m, k_p) parameters of its parts; lengths in the designs' unit, angles in
+        radians
 
-    The kit as one vector p (n_p,): kinds in alphabetical order, within them part by part, parameter by parameter.
+    The kit as one vector p (n_p,): kinds in alphabetical order, within them part by part, parameter
+    by parameter.
     """
 
     parts: Mapping[str, np.ndarray]
@@ -53,24 +57,37 @@ class Kit:
     def with_vector(self, p: np.ndarray) -> Kit:
         """The kit with other parameters p (n_p,)."""
         p = np.asarray(p, dtype=float)
-        return Kit({name: p[start:start + self.parts[name].size].reshape(self.parts[name].shape)
-                    for name, start in self.offsets.items()})
+        return Kit(
+            {
+                name: p[start : start + self.parts[name].size].reshape(self.parts[name].shape)
+                for name, start in self.offsets.items()
+            }
+        )
 
     def bounds(self, bounds: Mapping[str, tuple] | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """(n_p,), (n_p,): bounds of `vector`, natural ones narrowed by the user's (kind -> lower, upper)."""
+        """(n_p,), (n_p,): bounds of `vector`, natural ones narrowed by the user's (kind -> lower,
+        upper)."""
         pairs = [(part_kind(name).bounds(bounds), len(parts)) for name, parts in self.parts.items()]
-        lower, upper = (np.concatenate([np.tile(pair[side], m) for pair, m in pairs]) for side in (0, 1))
+        lower, upper = (
+            np.concatenate([np.tile(pair[side], m) for pair, m in pairs]) for side in (0, 1)
+        )
         return lower, upper
 
     def to_dict(self) -> dict[str, list]:
         """Plain lists for JSON: kind -> [[...], ...], or [...] for kinds of one parameter."""
-        return {name: (parts[:, 0] if parts.shape[1] == 1 else parts).tolist() for name, parts in self.parts.items()}
+        return {
+            name: (parts[:, 0] if parts.shape[1] == 1 else parts).tolist()
+            for name, parts in self.parts.items()
+        }
 
     @classmethod
     def from_dict(cls, data: Any, source: str = "kit") -> Kit:
-        """The kit that `to_dict` wrote; InputError for unknown kinds, wrong shapes, values that aren't numbers."""
+        """The kit that `to_dict` wrote; InputError for unknown kinds, wrong shapes, values that
+        aren't numbers."""
         if not isinstance(data, Mapping) or not data:
-            raise InputError("a kit is a non-empty object: kind of parts -> list of parts", source=source)
+            raise InputError(
+                "a kit is a non-empty object: kind of parts -> list of parts", source=source
+            )
         try:
             return cls(dict(data))
         except InputError as error:
@@ -84,20 +101,30 @@ def _checked(kind: PartKind, values: Any) -> np.ndarray:
     except ValueError:  # lists of different lengths
         given = np.array(None)
     if given.dtype.kind not in "iuf":
-        raise InputError("parts are lists of numbers, equally many each", field=f"kit.{kind.name}", value=values)
+        raise InputError(
+            "parts are lists of numbers, equally many each", field=f"kit.{kind.name}", value=values
+        )
     parts = given.astype(float)
     if parts.ndim == 1 and kind.n_parameters == 1:
         parts = parts[:, None]
     if parts.ndim != 2 or len(parts) == 0 or parts.shape[1] != kind.n_parameters:
         names = ", ".join(kind.parameter_names)
-        raise InputError(f"expected at least one part of {kind.n_parameters} parameters ({names})",
-                         field=f"kit.{kind.name}", value=values)
+        raise InputError(
+            f"expected at least one part of {kind.n_parameters} parameters ({names})",
+            field=f"kit.{kind.name}",
+            value=values,
+        )
     tolerance = 1e-9 * np.abs(parts).max()
-    bad = ~(np.isfinite(parts) & (parts >= kind.lower - tolerance) & (parts <= kind.upper + tolerance))
+    bad = ~(
+        np.isfinite(parts) & (parts >= kind.lower - tolerance) & (parts <= kind.upper + tolerance)
+    )
     if bad.any():
         row = int(np.argwhere(bad)[0, 0])
-        raise InputError("outside of what such a part can be", field=f"kit.{kind.name}[{row}]",
-                         value=parts[row].tolist())
+        raise InputError(
+            "outside of what such a part can be",
+            field=f"kit.{kind.name}[{row}]",
+            value=parts[row].tolist(),
+        )
     parts.setflags(write=False)
     return parts
 
@@ -119,12 +146,16 @@ class Assignment:
     def matrix(self, kit: Kit, upper: bool = False) -> sp.csr_array:
         """M (n_q, n_p): the elements that the kit p realises are q = M p.
 
-        With kinds that realise intervals, M p is their lower end, and `upper` asks for the upper one.
+        With kinds that realise intervals, M p is their lower end, and `upper` asks for the upper
+        one.
         """
-        return self._rows(kit, [_end(variants, variant, upper) for _, _, variants, variant in self._filled()])
+        return self._rows(
+            kit, [_end(variants, variant, upper) for _, _, variants, variant in self._filled()]
+        )
 
     def contact(self, q: np.ndarray, kit: Kit) -> tuple[sp.csr_array, np.ndarray]:
-        """M (n_q, n_p) and active (n_q,) bool: the elements q differ by q - M p where active, elsewhere not at all.
+        """M (n_q, n_p) and active (n_q,) bool: the elements q differ by q - M p where active,
+        elsewhere not at all.
 
         Without interval parts, M is `matrix` and every element is active.
         """
@@ -137,7 +168,8 @@ class Assignment:
         return self._rows(kit, blocks), active
 
     def realise(self, kit: Kit, q: np.ndarray) -> np.ndarray:
-        """(n_q,) the elements nearest to q that the assigned parts realise; entries outside the groups as in q."""
+        """(n_q,) the elements nearest to q that the assigned parts realise; entries outside the
+        groups as in q."""
         matrix, active = self.contact(q, kit)
         return np.where(active, matrix @ kit.vector, q)
 
@@ -155,19 +187,32 @@ class Assignment:
 
     def to_dict(self) -> list[dict[str, Any]]:
         """Plain lists for JSON, one object a group: kind, part, variant."""
-        return [{"kind": group.kind, "part": part.tolist(), "variant": variant.tolist()}
-                for group, part, variant in zip(self.groups, self.part, self.variant)]
+        return [
+            {"kind": group.kind, "part": part.tolist(), "variant": variant.tolist()}
+            for group, part, variant in zip(self.groups, self.part, self.variant)
+        ]
 
     @classmethod
-    def from_dict(cls, data: Any, groups: Sequence[ElementGroup], n_q: int, kit: Kit,
-                  source: str = "assignment") -> Assignment:
-        """The assignment of these groups to this kit that `to_dict` wrote; InputError when it doesn't fit them."""
+    def from_dict(
+        cls,
+        data: Any,
+        groups: Sequence[ElementGroup],
+        n_q: int,
+        kit: Kit,
+        source: str = "assignment",
+    ) -> Assignment:
+        """The assignment of these groups to this kit that `to_dict` wrote; InputError when it
+        doesn't fit them."""
         try:
             kinds = [entry["kind"] for entry in data]
-            part, variant = (tuple(np.array(entry[key], dtype=np.intp) for entry in data)
-                             for key in ("part", "variant"))
+            part, variant = (
+                tuple(np.array(entry[key], dtype=np.intp) for entry in data)
+                for key in ("part", "variant")
+            )
         except (TypeError, KeyError, ValueError):
-            raise InputError("expected a list of objects with kind, part and variant", source=source) from None
+            raise InputError(
+                "expected a list of objects with kind, part and variant", source=source
+            ) from None
         sizes = [len(group.indices) for group in groups]
         lengths = ([len(a) for a in part], [len(a) for a in variant])
         if kinds != [group.kind for group in groups] or lengths != (sizes, sizes):
@@ -175,28 +220,41 @@ class Assignment:
         assignment = cls(tuple(groups), part, variant, n_q)
         for group, parts, variants, chosen in assignment._filled():
             if not (_within(parts, len(kit[group.kind])) and _within(chosen, len(variants.names))):
-                raise InputError("names a part or variant that doesn't exist", source=source, field=group.kind)
+                raise InputError(
+                    "names a part or variant that doesn't exist", source=source, field=group.kind
+                )
         return assignment
 
     def _filled(self) -> Iterator[tuple[ElementGroup, np.ndarray, Variants, np.ndarray]]:
-        """Each group that has elements: the group, its parts, what its variants mean, its variants."""
+        """Each group that has elements: the group, its parts, what its variants mean, its
+        variants."""
         for group, part, variant in zip(self.groups, self.part, self.variant):
             if len(part):
-                yield group, part, part_kind(group.kind).variants_of(group.indices.shape[1]), variant
+                yield (
+                    group,
+                    part,
+                    part_kind(group.kind).variants_of(group.indices.shape[1]),
+                    variant,
+                )
 
     def _rows(self, kit: Kit, blocks: Sequence[np.ndarray]) -> sp.csr_array:
-        """CSR (n_q, n_p) of each filled group's maps (n, k_e, k_p) from its parts to its elements."""
+        """CSR (n_q, n_p) of each filled group's maps (n, k_e, k_p) from its parts to its
+        elements."""
         rows, columns, values = [], [], []
         for (group, part, _, _), block in zip(self._filled(), blocks):
             k_p = block.shape[2]
             first = kit.offsets[group.kind] + k_p * part
             rows.append(np.broadcast_to(group.indices[:, :, None], block.shape).ravel())
-            columns.append(np.broadcast_to((first[:, None] + np.arange(k_p))[:, None, :], block.shape).ravel())
+            columns.append(
+                np.broadcast_to((first[:, None] + np.arange(k_p))[:, None, :], block.shape).ravel()
+            )
             values.append(block.ravel())
         entries, i, j = (np.concatenate(a) if a else np.empty(0) for a in (values, rows, columns))
         used = entries != 0
         shape = (self.n_q, len(kit.vector))
-        return sp.csr_array((entries[used], (i[used].astype(int), j[used].astype(int))), shape=shape)
+        return sp.csr_array(
+            (entries[used], (i[used].astype(int), j[used].astype(int))), shape=shape
+        )
 
 
 def _within(numbers: np.ndarray, count: int) -> bool:
@@ -205,5 +263,9 @@ def _within(numbers: np.ndarray, count: int) -> bool:
 
 def _end(variants: Variants, variant: np.ndarray, upper: bool) -> np.ndarray:
     """(n, k_e, k_p) maps to the lower or upper end of what a part realises."""
-    maps = variants.matrices if variants.reach is None or not upper else variants.matrices + variants.reach
+    maps = (
+        variants.matrices
+        if variants.reach is None or not upper
+        else variants.matrices + variants.reach
+    )
     return maps[variant]

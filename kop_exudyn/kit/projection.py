@@ -1,28 +1,31 @@
 """The projection energy: how far the elements are from the kit that suits them best.
 
-P(q) = w_c sum over kinds of (1/n_kind) sum_j rho(p_c(j), q_j), minimised over the parts p and the assignment c, with
-rho half the squared difference in the best variant over the square of the kind's scale. As (p, c) are minimisers, the
-derivative of P in q is that at fixed (p, c) (Becker, Kusupati, Suzuki, Pauly, ACM TOG, 2024).
+P(q) = w_c sum over kinds of (1/n_kind) sum_j rho(p_c(j), q_j), minimised over the parts p and the
+assignment c, with rho half the squared difference in the best variant over the square of the kind's
+scale. As (p, c) are minimisers, the derivative of P in q is that at fixed (p, c) (Becker, Kusupati,
+Suzuki, Pauly, ACM TOG, 2024).
 """
+
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Mapping, Sequence
 
 import numpy as np
 import scipy.sparse as sp
 
-from ..structures.base import ElementGroup
 from .assign import to_assignment
 from .cluster import lloyd
 from .elements import KindElements, Penalties, collect
+from .groups import ElementGroup
 from .kinds import Bounds, part_kind
 from .parts import Assignment, Kit
 
 
 @dataclass(frozen=True)
 class ProjectionHessian:
-    """Second derivatives of the energy over (q, p) at a fixed assignment, which it is quadratic for.
+    """Second derivatives of the energy over (q, p) at a fixed assignment, which it is quadratic
+    for.
 
     qq : (n_q, n_q) diagonal;  qp : (n_q, n_p);  pp : (n_p, n_p); all sparse
     """
@@ -32,11 +35,13 @@ class ProjectionHessian:
     pp: sp.csr_array
 
     def lifted(self) -> sp.csr_array:
-        """(n_q + n_p, n_q + n_p) Hessian of a QP over (dq, dp): sparse, though its elimination couples designs."""
+        """(n_q + n_p, n_q + n_p) Hessian of a QP over (dq, dp): sparse, though its elimination
+        couples designs."""
         return sp.block_array([[self.qq, self.qp], [self.qp.T, self.pp]], format="csr")
 
     def reduced(self) -> np.ndarray:
-        """(n_q, n_q) dense, parts eliminated as if none were at a bound: within a cluster, identity minus mean."""
+        """(n_q, n_q) dense, parts eliminated as if none were at a bound: within a cluster, identity
+        minus mean."""
         inverse = np.linalg.pinv(self.pp.toarray(), hermitian=True)
         qp = self.qp.toarray()
         return self.qq.toarray() - qp @ inverse @ qp.T
@@ -69,8 +74,14 @@ class Projection:
     penalties: Penalties | None = None
 
     @classmethod
-    def of_inputs(cls, groups: Sequence[ElementGroup], q: np.ndarray, weight: float = 1.0,
-                  bounds: Bounds | None = None, penalties: Penalties | None = None) -> Projection:
+    def of_inputs(
+        cls,
+        groups: Sequence[ElementGroup],
+        q: np.ndarray,
+        weight: float = 1.0,
+        bounds: Bounds | None = None,
+        penalties: Penalties | None = None,
+    ) -> Projection:
         """The energy with the scales of the input parameters q (n_q,)."""
         scales = {name: elements.scale for name, elements in collect(groups, q).items()}
         return cls(tuple(groups), scales, weight, bounds, penalties)
@@ -79,7 +90,8 @@ class Projection:
         return replace(self, weight=weight)
 
     def minimise(self, q: np.ndarray, kit: Kit, fixed_kit: bool = False) -> ProjectionMinimum:
-        """Best parts and assignment for q (n_q,), alternating from `kit`; with `fixed_kit` the assignment alone."""
+        """Best parts and assignment for q (n_q,), alternating from `kit`; with `fixed_kit` the
+        assignment alone."""
         elements = self._elements(q)
         parts, labels = {}, {}
         for name, e in elements.items():
@@ -97,7 +109,8 @@ class Projection:
         return 0.5 * float(weights @ difference**2 + self._part_weights(kit) @ kit.vector**2)
 
     def gradient(self, q: np.ndarray, kit: Kit, assignment: Assignment) -> np.ndarray:
-        """(n_q,) derivative in q, zero outside the groups; the exact one where kit and assignment are the minimum."""
+        """(n_q,) derivative in q, zero outside the groups; the exact one where kit and assignment
+        are the minimum."""
         _, difference, weights = self._difference(q, kit, assignment)
         return weights * difference
 
@@ -112,17 +125,24 @@ class Projection:
         weights = sp.dia_array((self._weights(len(q))[None] * active, [0]), shape=(len(q), len(q)))
         penalty = sp.dia_array((self._part_weights(kit)[None], [0]), shape=(len(kit.vector),) * 2)
         weighted = weights @ matrix
-        return ProjectionHessian(sp.csr_array(weights), sp.csr_array(-weighted),
-                                 sp.csr_array(matrix.T @ weighted + penalty))
+        return ProjectionHessian(
+            sp.csr_array(weights),
+            sp.csr_array(-weighted),
+            sp.csr_array(matrix.T @ weighted + penalty),
+        )
 
     def tightness(self, q: np.ndarray, kit: Kit, assignment: Assignment) -> dict[str, float]:
-        """kind -> root mean square distance of the elements to their parts, relative to the kind's scale."""
+        """kind -> root mean square distance of the elements to their parts, relative to the kind's
+        scale."""
         _, difference, _ = self._difference(q, kit, assignment)
         squares = dict.fromkeys(self.scales, 0.0)
         for group in self._filled:
             squares[group.kind] += float(np.sum(difference[group.indices] ** 2))
         counts = self._counts()
-        return {name: float(np.sqrt(total / counts[name])) / self.scales[name] for name, total in squares.items()}
+        return {
+            name: float(np.sqrt(total / counts[name])) / self.scales[name]
+            for name, total in squares.items()
+        }
 
     @property
     def _filled(self) -> list[ElementGroup]:
@@ -141,7 +161,9 @@ class Projection:
         """(n_q,) w_c / (n_kind scale^2) of each element parameter, zero outside the groups."""
         weights, counts = np.zeros(n_q), self._counts()
         for group in self._filled:
-            weights[group.indices] = self.weight / (counts[group.kind] * self.scales[group.kind] ** 2)
+            weights[group.indices] = self.weight / (
+                counts[group.kind] * self.scales[group.kind] ** 2
+            )
         return weights
 
     def _part_weights(self, kit: Kit) -> np.ndarray:
@@ -150,12 +172,15 @@ class Projection:
         for name, parts in kit.parts.items():
             own = part_kind(name).penalty
             penalty = (self.penalties or {}).get(name, 0.0 if own is None else own)
-            factor = self.weight / (len(parts) * self.scales[name] ** 2) if name in self.scales else 0.0
+            factor = (
+                self.weight / (len(parts) * self.scales[name] ** 2) if name in self.scales else 0.0
+            )
             rows.append((factor * np.broadcast_to(penalty, parts.shape)).ravel())
         return np.concatenate(rows)
 
-    def _difference(self, q: np.ndarray, kit: Kit,
-                    assignment: Assignment) -> tuple[sp.csr_array, np.ndarray, np.ndarray]:
+    def _difference(
+        self, q: np.ndarray, kit: Kit, assignment: Assignment
+    ) -> tuple[sp.csr_array, np.ndarray, np.ndarray]:
         """M of `Assignment.contact`, the differences (n_q,) and their weights (n_q,)."""
         matrix, active = assignment.contact(q, kit)
         return matrix, np.where(active, q - matrix @ kit.vector, 0.0), self._weights(len(q))

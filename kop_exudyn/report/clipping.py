@@ -1,10 +1,13 @@
 """Triangle meshes cut where a function of their vertices changes its sign."""
+
 from __future__ import annotations
 
 import numpy as np
 
 
-def clipped(vertices: np.ndarray, faces: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def clipped(
+    vertices: np.ndarray, faces: np.ndarray, values: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """The part of a mesh where values (V,), linear between the vertices, are not positive.
 
     vertices (V, 3), faces (F, 3) : triangles; returns the same of the part, without unused vertices
@@ -13,15 +16,24 @@ def clipped(vertices: np.ndarray, faces: np.ndarray, values: np.ndarray) -> tupl
     count = inside[faces].sum(axis=1)
     one, two = _turned(faces[count == 1], inside), _turned(faces[count == 2], ~inside)
     # a triangle's cut edges start at its first vertex, the one that is alone on its side
-    cuts = np.concatenate([edges for alone in (one, two) for edges in (alone[:, [0, 1]], alone[:, [0, 2]])])
+    cuts = np.concatenate(
+        [edges for alone in (one, two) for edges in (alone[:, [0, 1]], alone[:, [0, 2]])]
+    )
     edges, number = np.unique(np.sort(cuts, axis=1), axis=0, return_inverse=True)
-    a, b, c, d = np.split(len(vertices) + number.reshape(-1), np.cumsum([len(one), len(one), len(two)]))
+    a, b, c, d = np.split(
+        len(vertices) + number.reshape(-1), np.cumsum([len(one), len(one), len(two)])
+    )
     start, end = values[edges].T
     share = (start / (start - end))[:, None]
     points = (1 - share) * vertices[edges[:, 0]] + share * vertices[edges[:, 1]]
-    found = np.concatenate([
-        faces[count == 3], np.stack([one[:, 0], a, b], axis=1),
-        np.stack([c, two[:, 1], two[:, 2]], axis=1), np.stack([c, two[:, 2], d], axis=1)])
+    found = np.concatenate(
+        [
+            faces[count == 3],
+            np.stack([one[:, 0], a, b], axis=1),
+            np.stack([c, two[:, 1], two[:, 2]], axis=1),
+            np.stack([c, two[:, 2], d], axis=1),
+        ]
+    )
     used, numbers = np.unique(found, return_inverse=True)
     return np.concatenate([vertices, points])[used], numbers.reshape(-1, 3)
 

@@ -1,4 +1,6 @@
-"""What a result was computed with: versions and machine, without the name of either user or host."""
+"""What a result was computed with: versions and machine, without the name of either user or
+host."""
+
 from __future__ import annotations
 
 import os
@@ -6,18 +8,23 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from .. import __version__, memory
+from .. import __version__
+from ..search import memory
 
 # the packages whose versions can change numbers
 _PACKAGES = ("exudyn", "numpy", "scipy", "numba", "qdldl", "osqp", "piqp", "libigl")
 
 
 def environment() -> dict[str, Any]:
-    """Versions of this package, Python and the numerical libraries; system, processor type, usable cores."""
+    """Versions of this package, Python and the numerical libraries; system, processor type, usable
+    cores."""
     return {
-        "kop_exudyn": __version__, "python": platform.python_version(),
+        "kop_exudyn": __version__,
+        "python": platform.python_version(),
         **{name: found for name in _PACKAGES if (found := _version(name)) is not None},
-        "system": platform.system(), "processor": platform.machine(), "cores": usable_cores(),
+        "system": platform.system(),
+        "processor": platform.machine(),
+        "cores": usable_cores(),
     }
 
 
@@ -36,5 +43,6 @@ def _version(package: str) -> str | None:
 
 
 def peak_memory_mb() -> float:
-    """Largest memory of this process plus that of its largest ended subprocess, MB; 0 where the system doesn't tell."""
+    """Largest memory of this process plus that of its largest ended subprocess, MB; 0 where the
+    system doesn't tell."""
     return memory.peak_memory_mb() + memory.peak_memory_mb(of_ended_children=True)

@@ -1,16 +1,17 @@
 """How the objective and its terms fell, step by step, in the SQP stages."""
+
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from .style import CYCLE, INK, QUIET, style
+from ..drawing.style import CYCLE, INK, QUIET, style
 
 _SHOWN = 1e-7  # of the largest value drawn; smaller ones would only stretch the axis
 
@@ -49,21 +50,32 @@ class History:
 
 
 def draw_history(histories: Sequence[History]) -> Figure:
-    """One panel a stage, logarithmic, on one scale; a line where w_c changes or a round begins says so."""
-    names = list(dict.fromkeys(name for history in histories for step in history.steps for name in step.terms))
+    """One panel a stage, logarithmic, on one scale; a line where w_c changes or a round begins says
+    so."""
+    names = list(
+        dict.fromkeys(
+            name for history in histories for step in history.steps for name in step.terms
+        )
+    )
     colours = {name: CYCLE[k % len(CYCLE)] for k, name in enumerate(names)}
     steps = [max(len(history.steps), 1) for history in histories]
     widths = [max(width, 0.45 * max(steps)) for width in steps]  # a short stage stays readable
     with style():
         figure = Figure(figsize=(9.5, 3.7), layout="constrained")
-        panels = figure.subplots(1, len(histories), sharey=True, width_ratios=widths, squeeze=False)[0]
+        panels = figure.subplots(
+            1, len(histories), sharey=True, width_ratios=widths, squeeze=False
+        )[0]
         for ax, history in zip(panels, histories):
             _draw_stage(ax, history, colours)
         panels[0].set_yscale("log")
         panels[0].set_ylabel("objective and its terms")
         _limit_below(panels[0], histories)
-        handles = {label: handle for ax in panels for handle, label in zip(*ax.get_legend_handles_labels())}
-        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=len(handles) or 1)
+        handles = {
+            label: handle for ax in panels for handle, label in zip(*ax.get_legend_handles_labels())
+        }
+        figure.legend(
+            handles.values(), handles.keys(), loc="outside lower center", ncols=len(handles) or 1
+        )
     return figure
 
 
@@ -79,14 +91,28 @@ def _draw_stage(ax: Axes, history: History, colours: Mapping[str, str]) -> None:
     marker = "o" if count < 60 else None
     for name, colour in colours.items():
         if any(name in step.terms for step in history.steps):
-            ax.plot(*_broken(history.steps, name), color=colour, label=name, marker=marker, markersize=2.5,
-                    linewidth=1.2)
-    ax.plot(*_broken(history.steps), color=INK, label="objective", marker=marker, markersize=3.5, linewidth=2.2)
+            ax.plot(
+                *_broken(history.steps, name),
+                color=colour,
+                label=name,
+                marker=marker,
+                markersize=2.5,
+                linewidth=1.2,
+            )
+    ax.plot(
+        *_broken(history.steps),
+        color=INK,
+        label="objective",
+        marker=marker,
+        markersize=3.5,
+        linewidth=2.2,
+    )
     _mark_stretches(ax, history)
 
 
 def _broken(steps: Sequence[HistoryStep], name: str | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Step numbers and a term's values (default: the sum), with a gap where the next SQP begins: J may jump there."""
+    """Step numbers and a term's values (default: the sum), with a gap where the next SQP begins: J
+    may jump there."""
     places, values = [], []
     for number, step in enumerate(steps, 1):
         if number > 1 and step.stretch != steps[number - 2].stretch:
@@ -105,15 +131,28 @@ def _mark_stretches(ax: Axes, history: History) -> None:
         if label:
             if first > 1:
                 ax.axvline(first - 0.5, color=QUIET, linewidth=0.9, linestyle=(0, (4, 3)), zorder=0)
-            ax.text(first - 0.5 + 0.008 * len(history.steps), 0.985, label, color=QUIET, size=8,
-                    transform=ax.get_xaxis_transform(), va="top",
-                    rotation=90 if count < 0.25 * len(history.steps) else 0)
+            ax.text(
+                first - 0.5 + 0.008 * len(history.steps),
+                0.985,
+                label,
+                color=QUIET,
+                size=8,
+                transform=ax.get_xaxis_transform(),
+                va="top",
+                rotation=90 if count < 0.25 * len(history.steps) else 0,
+            )
         first += count
 
 
 def _limit_below(ax: Axes, histories: Sequence[History]) -> None:
-    values = np.array([value for history in histories for step in history.steps
-                       for value in (step.value, *step.terms.values())])
+    values = np.array(
+        [
+            value
+            for history in histories
+            for step in history.steps
+            for value in (step.value, *step.terms.values())
+        ]
+    )
     values = values[values > 0]
     if len(values):
         ax.set_ylim(bottom=max(values.min(), _SHOWN * values.max()) / 2, top=values.max() * 6)
@@ -122,4 +161,8 @@ def _limit_below(ax: Axes, histories: Sequence[History]) -> None:
 def _power(weight: float) -> str:
     """10^3 for 1000, the plain number where it is no power of ten."""
     exponent = np.log10(weight) if weight > 0 else np.nan
-    return f"$10^{{{round(exponent)}}}$" if abs(exponent - np.round(exponent)) < 1e-9 else f"{weight:g}"
+    return (
+        f"$10^{{{round(exponent)}}}$"
+        if abs(exponent - np.round(exponent)) < 1e-9
+        else f"{weight:g}"
+    )

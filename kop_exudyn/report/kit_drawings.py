@@ -1,17 +1,18 @@
 """From the outcome of a kit optimisation to what its figures draw."""
+
 from __future__ import annotations
 
-from typing import Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..analysis.kit_result import INPUT, REDEPLOYED, STAGES, KitResult
 from ..equilibrium.newton import Equilibrium
 from ..errors import SimulationFailure
+from ..kit.groups import ElementGroup
 from ..kit.kinds import part_kind
-from ..optimize.objective import Evaluation
-from ..optimize.stage_results import StageResult
-from ..structures.base import Design, ElementGroup
+from ..search.objective import Evaluation
+from ..search.result import INPUT, REDEPLOYED, STAGES, KitResult
+from ..structures.base import Design
 from .designs import DrawnDesign, DrawnState
 from .history import History, HistoryStep
 from .parameters import ElementCloud, PartSpace
@@ -28,8 +29,11 @@ def drawn_stages(result: KitResult, stages: Sequence[str]) -> list[DrawnDesign]:
     """The same for the stages asked for, where the result has them."""
     drawn = []
     for n, (design, reference) in enumerate(zip(result.designs, result.references)):
-        states = [drawn_state(design, result.stages[stage].designs[n], stage)
-                  for stage in stages if stage in result.stages]
+        states = [
+            drawn_state(design, result.stages[stage].designs[n], stage)
+            for stage in stages
+            if stage in result.stages
+        ]
         role = design.fitted_role.name
         wanted = design.scene(role).polylines(reference.equilibria[role].state)
         drawn.append(DrawnDesign(design.name, states, wanted))
@@ -43,8 +47,11 @@ def drawn_state(design: Design, outcome: Evaluation | SimulationFailure, title: 
     role = design.fitted_role.name
     state, placement = outcome.equilibria[role].state, outcome.fit.placement
     return DrawnState(
-        title, [placement.apply(line) for line in design.scene(role).polylines(state)],
-        placement.apply(state.positions[design.joints]), 100 * outcome.fit.distances / outcome.fit.diagonal)
+        title,
+        [placement.apply(line) for line in design.scene(role).polylines(state)],
+        placement.apply(state.positions[design.joints]),
+        100 * outcome.fit.distances / outcome.fit.diagonal,
+    )
 
 
 def histories(result: KitResult) -> list[History]:
@@ -58,7 +65,8 @@ def histories(result: KitResult) -> list[History]:
 
 
 def part_spaces(result: KitResult) -> list[PartSpace]:
-    """Parts and elements by kind: the inputs', and those of the relaxed stage where all designs have them."""
+    """Parts and elements by kind: the inputs', and those of the relaxed stage where all designs
+    have them."""
     clouds = {"input elements": [design.parameters for design in result.designs]}
     relaxed = result.stages["relaxed"]
     if not any(isinstance(outcome, SimulationFailure) for outcome in relaxed.designs):
@@ -66,17 +74,29 @@ def part_spaces(result: KitResult) -> list[PartSpace]:
     groups = [group for design in result.designs for group in design.groups]
     owners = [n for n, design in enumerate(result.designs) for _ in design.groups]
     spaces = []
-    kinds = sorted(result.kit.parts.items(), key=lambda item: -item[1].shape[1])  # planes before histograms
+    # planes before histograms
+    kinds = sorted(result.kit.parts.items(), key=lambda item: -item[1].shape[1])
     for name, parts in kinds:
         members = [(group, n) for group, n in zip(groups, owners) if group.kind == name]
-        spaces.append(PartSpace(name, part_kind(name).parameter_names, parts,
-                                [_cloud(label, name, members, q) for label, q in clouds.items()]))
+        spaces.append(
+            PartSpace(
+                name,
+                part_kind(name).parameter_names,
+                parts,
+                [_cloud(label, name, members, q) for label, q in clouds.items()],
+            )
+        )
     return spaces
 
 
-def _cloud(label: str, kind_name: str, members: Sequence[tuple[ElementGroup, int]],
-           parameters: Sequence[np.ndarray]) -> ElementCloud:
-    """Elements with the most parameters as the parts that would realise them, the others as plain values."""
+def _cloud(
+    label: str,
+    kind_name: str,
+    members: Sequence[tuple[ElementGroup, int]],
+    parameters: Sequence[np.ndarray],
+) -> ElementCloud:
+    """Elements with the most parameters as the parts that would realise them, the others as plain
+    values."""
     kind = part_kind(kind_name)
     most = max(group.indices.shape[1] for group, _ in members)
     full, ends = [np.empty((0, kind.n_parameters))], [np.empty(0)]
@@ -90,64 +110,123 @@ def _cloud(label: str, kind_name: str, members: Sequence[tuple[ElementGroup, int
 
 
 def summary_rows(result: KitResult) -> tuple[list[str], list[list]]:
-    """Headings and rows of the table of all designs: deviations after every stage, then figures of the assigned one."""
+    """Headings and rows of the table of all designs: deviations after every stage, then figures of
+    the assigned one."""
     stages = [stage for stage in STAGES if stage in result.stages]
-    headings = ["design", "elements", *(f"{stage}, max %" for stage in (INPUT, *stages)), "assigned, mean %",
-                "energy ratio", "largest stress", "utilisation", "stable"]
+    headings = [
+        "design",
+        "elements",
+        *(f"{stage}, max %" for stage in (INPUT, *stages)),
+        "assigned, mean %",
+        "energy ratio",
+        "largest stress",
+        "utilisation",
+        "stable",
+    ]
     rows = []
     for n, design in enumerate(result.designs):
         found = {stage: result.summary(stage, n) for stage in stages}
         final = found["assigned"]
-        largest = [_fit(summary, "max_percent") for summary in (result.input_summary(n), *found.values())]
-        rows.append([design.name, design.n_elements, *largest, _fit(final, "mean_percent"), final.get("energy_ratio"),
-                     _worst(final, "equivalent_stress"), _worst(final, "utilisation"), final.get("stable")])
+        largest = [
+            _fit(summary, "max_percent") for summary in (result.input_summary(n), *found.values())
+        ]
+        rows.append(
+            [
+                design.name,
+                design.n_elements,
+                *largest,
+                _fit(final, "mean_percent"),
+                final.get("energy_ratio"),
+                _worst(final, "equivalent_stress"),
+                _worst(final, "utilisation"),
+                final.get("stable"),
+            ]
+        )
     return headings, rows
 
 
 def final_states(result: KitResult) -> dict[tuple[str, str, str], Equilibrium]:
     """(design, stage, role) -> equilibrium, for all that were found.
 
-    The designs as given are stage "input", those that opened from their assembly in the end stage "redeployed".
+    The designs as given are stage "input", those that opened from their assembly in the end stage
+    "redeployed".
     """
-    inputs = {(design.name, INPUT, role): equilibrium for design, reference in zip(result.designs, result.references)
-              for role, equilibrium in reference.equilibria.items()}
-    outcomes = {stage: found.designs for stage, found in result.stages.items()} | {REDEPLOYED: result.redeployed}
-    return inputs | {(design.name, stage, role): equilibrium
-                     for stage, found in outcomes.items() for design, outcome in zip(result.designs, found)
-                     if isinstance(outcome, Evaluation) for role, equilibrium in outcome.equilibria.items()}
+    inputs = {
+        (design.name, INPUT, role): equilibrium
+        for design, reference in zip(result.designs, result.references)
+        for role, equilibrium in reference.equilibria.items()
+    }
+    outcomes = {stage: found.designs for stage, found in result.stages.items()} | {
+        REDEPLOYED: result.redeployed
+    }
+    return inputs | {
+        (design.name, stage, role): equilibrium
+        for stage, found in outcomes.items()
+        for design, outcome in zip(result.designs, found)
+        if isinstance(outcome, Evaluation)
+        for role, equilibrium in outcome.equilibria.items()
+    }
 
 
 def remarks(result: KitResult) -> list[str]:
-    """What a reader should know besides the figures: snaps, other states to open into, yield, how SQPs ended."""
+    """What a reader should know besides the figures: snaps, other states to open into, yield, how
+    SQPs ended."""
     stages = result.stages
-    found = [f"{jump.design} snapped at {jump.fraction:.0%} of the way to its parts: {jump.distance:.1%} of its size."
-             for jump in stages["assigned"].jumps]
-    found += [_about_opening(design.name, result.redeployment(n), result.summary("assigned", n))
-              for n, design in enumerate(result.designs) if result.redeployed]
-    found += [_about_strength(design.name, result.summary("assigned", n)) for n, design in enumerate(result.designs)]
+    found = [
+        f"{jump.design} snapped at {jump.fraction:.0%} of the way to its parts: "
+        f"{jump.distance:.1%} of its size."
+        for jump in stages["assigned"].jumps
+    ]
+    found += [
+        _about_opening(design.name, result.redeployment(n), result.summary("assigned", n))
+        for n, design in enumerate(result.designs)
+        if result.redeployed
+    ]
+    found += [
+        _about_strength(design.name, result.summary("assigned", n))
+        for n, design in enumerate(result.designs)
+    ]
     found = [remark for remark in found if remark]
-    return found + [f"The {name} stage ended after {stage.steps} steps: {stage.status}."
-                    for name, stage in stages.items() if stage.status]
+    return found + [
+        f"The {name} stage ended after {stage.steps} steps: {stage.status}."
+        for name, stage in stages.items()
+        if stage.status
+    ]
 
 
 def _about_opening(name: str, opened: Mapping, kept: Mapping) -> str:
-    """A sentence where a design, opened from its flat or compact assembly, ends in another state than the kept one."""
+    """A sentence where a design, opened from its flat or compact assembly, ends in another state
+    than the kept one."""
     if "failed" in kept or opened.get("same_state"):
         return ""
     if "failed" in opened:
         return f"{name} could not be opened from its assembly: {opened['failed']}."
     ratio = opened["elastic_energy"] / kept["elastic_energy"]
-    return (f"{name} has several stable states: opened from its assembly without guidance it settles "
-            f"{opened['moved_percent']:.1f} % of its size from the one shown, at {ratio:.3f} times its elastic energy "
-            f"({opened['fit']['max_percent']:.2f} % from the target at most); it has to be led into the one shown.")
+    return (
+        f"{name} has several stable states: opened from its assembly without guidance it settles "
+        f"{opened['moved_percent']:.1f} % of its size from the one shown, at {ratio:.3f} times "
+        f"its elastic energy "
+        f"({opened['fit']['max_percent']:.2f} % from the target at most); it has to be led into "
+        f"the one shown."
+    )
 
 
 def _about_strength(name: str, summary: Mapping) -> str:
     """A sentence where rods of an assigned design are stressed beyond their elastic limit."""
-    beyond = [f"{strength['utilisation']:.2f} times in its {role} state" for role, strength in
-              summary.get("strength", {}).items() if (strength["utilisation"] or 0) > 1]
-    return (f"{name}'s rods are stressed beyond their elastic limit, {' and '.join(beyond)}: they would yield or "
-            "break; thinner ones are stressed less.") if beyond else ""
+    beyond = [
+        f"{strength['utilisation']:.2f} times in its {role} state"
+        for role, strength in summary.get("strength", {}).items()
+        if (strength["utilisation"] or 0) > 1
+    ]
+    return (
+        (
+            f"{name}'s rods are stressed beyond their elastic limit, {' and '.join(beyond)}: they "
+            f"would yield or "
+            "break; thinner ones are stressed less."
+        )
+        if beyond
+        else ""
+    )
 
 
 def _fit(summary: Mapping, name: str) -> float | None:
@@ -156,5 +235,9 @@ def _fit(summary: Mapping, name: str) -> float | None:
 
 def _worst(summary: Mapping, name: str) -> float | None:
     """The largest stress or utilisation of all states."""
-    known = [strength[name] for strength in summary.get("strength", {}).values() if strength[name] is not None]
+    known = [
+        strength[name]
+        for strength in summary.get("strength", {}).values()
+        if strength[name] is not None
+    ]
     return max(known, default=None)

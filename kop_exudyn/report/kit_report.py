@@ -1,32 +1,38 @@
-"""What a kit optimisation leaves in its folder: results for programs, figures, and a page that shows them."""
+"""What a kit optimisation leaves in its folder: results for programs, figures, and a page that
+shows them."""
+
 from __future__ import annotations
 
 from pathlib import Path
 
-from ..analysis.kit_result import KitResult
+from ..drawing.style import save_figure
 from ..io.kits import save_kit
 from ..io.results import save_result, save_states
+from ..search.result import KitResult
 from .designs import draw_designs
 from .environment import environment
 from .history import draw_history
 from .kit_drawings import drawn_designs, final_states, histories, part_spaces, remarks, summary_rows
 from .page import Page
 from .parameters import draw_parameters
-from .style import save_figure
 from .viewer import save_viewer
 from .viewer_scenes import kit_scene
 
 
 def write_kit_report(result: KitResult, folder: Path) -> Path:
-    """Write result.json, kit.json, states.npz, figures, viewer.html and index.html; files of those names are replaced.
+    """Write result.json, kit.json, states.npz, figures, viewer.html and index.html; files of those
+    names are replaced.
 
     Returns the page's path. Raises InputError when a file can't be written.
     """
     save_result(folder / "result.json", result.to_dict(), overwrite=True)
     save_kit(folder / "kit.json", result.kit, overwrite=True)
     save_states(folder / "states.npz", final_states(result), overwrite=True)
-    figures = {"designs": draw_designs(drawn_designs(result)), "history": draw_history(histories(result)),
-               "parameters": draw_parameters(part_spaces(result))}
+    figures = {
+        "designs": draw_designs(drawn_designs(result)),
+        "history": draw_history(histories(result)),
+        "parameters": draw_parameters(part_spaces(result)),
+    }
     for name, figure in figures.items():
         save_figure(figure, folder / name, overwrite=True)
     save_viewer(folder / "viewer.html", kit_scene(result), overwrite=True)
@@ -37,31 +43,57 @@ def _page(result: KitResult, figures: dict) -> Page:
     sizes = " and ".join(f"{count} {kind}" for kind, count in result.kit.sizes.items())
     elements = sum(design.n_elements for design in result.designs)
     designs = "a design" if len(result.designs) == 1 else f"{len(result.designs)} designs"
-    title = f"An existing kit for {designs}" if "kit" in result.settings else f"One kit of parts for {designs}"
-    page = Page(title,
-                f"{sizes} parts realise the {elements} elements of {', '.join(d.name for d in result.designs)}.")
+    title = (
+        f"An existing kit for {designs}"
+        if "kit" in result.settings
+        else f"One kit of parts for {designs}"
+    )
+    page = Page(
+        title,
+        f"{sizes} parts realise the {elements} elements of "
+        f"{', '.join(d.name for d in result.designs)}.",
+    )
     page.links({"Turn the designs around in 3D": "viewer.html"})
-    page.table(*summary_rows(result),
-               "Distance of the joints from the target surface, in % of its bounding-box diagonal; elastic energy "
-               "relative to the input design's. Input: the designs as given. Direct: every input element replaced by "
-               "its part. Unrelaxed: parts then tuned. Relaxed: elements still free. Assigned: built from the kit. "
-               "Stress: the largest equivalent one (von Mises) in the assigned design's rods, in all of its states; "
-               "utilisation: the largest share of the material's elastic limit. A dash: no equilibrium found, or no "
-               "section or limit known.")
+    page.table(
+        *summary_rows(result),
+        "Distance of the joints from the target surface, in % of its bounding-box diagonal; "
+        "elastic energy "
+        "relative to the input design's. Input: the designs as given. Direct: every input element "
+        "replaced by "
+        "its part. Unrelaxed: parts then tuned. Relaxed: elements still free. Assigned: built "
+        "from the kit. "
+        "Stress: the largest equivalent one (von Mises) in the assigned design's rods, in all of "
+        "its states; "
+        "utilisation: the largest share of the material's elastic limit. A dash: no equilibrium "
+        "found, or no "
+        "section or limit known.",
+    )
     page.text("\n\n".join(remarks(result)))
     page.section("The designs").figure(
-        figures["designs"], "Rods and joints at the best placement on the target; grey: the input design.",
-        alt="Every design in 3D after the direct projection, the relaxed and the assigned stage")
+        figures["designs"],
+        "Rods and joints at the best placement on the target; grey: the input design.",
+        alt="Every design in 3D after the direct projection, the relaxed and the assigned stage",
+    )
     page.section("The optimisation").figure(
-        figures["history"], "The objective and its terms after every accepted step. At a dashed line the weight of the "
-        "projection energy changes, and the objective with it.", alt="Objective against steps for both stages")
+        figures["history"],
+        "The objective and its terms after every accepted step. At a dashed line the weight of the "
+        "projection energy changes, and the objective with it.",
+        alt="Objective against steps for both stages",
+    )
     page.section("Parts and elements").figure(
-        figures["parameters"], "Elements before and after the relaxed stage, and the final parts.",
-        alt="Elements and parts in the space of their parameters")
+        figures["parameters"],
+        "Elements before and after the relaxed stage, and the final parts.",
+        alt="Elements and parts in the space of their parameters",
+    )
     for kind, parts in result.kit.to_dict().items():
         several = isinstance(parts[0], list)
-        page.details(f"The {len(parts)} {kind} parts",
-                     {str(k): part if several else [part] for k, part in enumerate(parts, 1)})
-    page.section("How it was made", f"{result.equilibria:,} equilibria and {result.newton_iterations:,} Newton "
-                 f"iterations in {result.wall_s:.0f} s.")
+        page.details(
+            f"The {len(parts)} {kind} parts",
+            {str(k): part if several else [part] for k, part in enumerate(parts, 1)},
+        )
+    page.section(
+        "How it was made",
+        f"{result.equilibria:,} equilibria and {result.newton_iterations:,} Newton "
+        f"iterations in {result.wall_s:.0f} s.",
+    )
     return page.details("Settings", result.settings).details("Versions and machine", environment())

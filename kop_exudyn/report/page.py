@@ -1,24 +1,28 @@
-"""One self-contained HTML page: text, tables and figures in one file that needs no network and no script."""
+"""One self-contained HTML page: text, tables and figures in one file that needs no network and no
+script."""
+
 from __future__ import annotations
 
 import base64
+from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any, Mapping, Sequence
+from typing import Any
 
 from matplotlib.figure import Figure
 
-from ..io.files import write_text
-from ..io.json_files import to_json
-from .style import figure_bytes
+from ..drawing.style import figure_bytes
+from ..files.files import write_text
+from ..files.json_files import to_json
 
 _MEDIA = {"svg": "image/svg+xml", "png": "image/png"}
 
 
 class Page:
-    """A page that is filled from top to bottom. Texts are plain; whatever they contain is shown as it is.
+    """A page that is filled from top to bottom. Texts are plain; whatever they contain is shown as
+    it is.
 
     title : heading of the page
     lead : its first sentences
@@ -38,7 +42,9 @@ class Page:
 
     def text(self, text: str) -> Page:
         """Paragraphs."""
-        self._body += [f"<p>{escape(part.strip())}</p>" for part in text.split("\n\n") if part.strip()]
+        self._body += [
+            f"<p>{escape(part.strip())}</p>" for part in text.split("\n\n") if part.strip()
+        ]
         return self
 
     def links(self, files: Mapping[str, str]) -> Page:
@@ -47,29 +53,45 @@ class Page:
         self._body.append(f'<p class="links">{" · ".join(shown)}</p>')
         return self
 
-    def table(self, headings: Sequence[str], rows: Sequence[Sequence[Any]], caption: str = "") -> Page:
+    def table(
+        self, headings: Sequence[str], rows: Sequence[Sequence[Any]], caption: str = ""
+    ) -> Page:
         """A table; numbers stand right and are shown with four digits, None as a dash."""
         numeric = [any(_is_number(row[k]) for row in rows) for k in range(len(headings))]
         head = "".join(_cell("th", heading, right) for heading, right in zip(headings, numeric))
         body = "".join(
-            "<tr>" + "".join(_cell("td", shown(value), right and not isinstance(value, str))
-                             for value, right in zip(row, numeric)) + "</tr>" for row in rows)
+            "<tr>"
+            + "".join(
+                _cell("td", shown(value), right and not isinstance(value, str))
+                for value, right in zip(row, numeric)
+            )
+            + "</tr>"
+            for row in rows
+        )
         note = f"<caption>{escape(caption)}</caption>" if caption else ""
-        self._body.append(f'<div class="scroll"><table>{note}<thead><tr>{head}</tr></thead>'
-                          f"<tbody>{body}</tbody></table></div>")
+        self._body.append(
+            f'<div class="scroll"><table>{note}<thead><tr>{head}</tr></thead>'
+            f"<tbody>{body}</tbody></table></div>"
+        )
         return self
 
-    def figure(self, figure: Figure | bytes, caption: str, *, alt: str, suffix: str = "svg") -> Page:
+    def figure(
+        self, figure: Figure | bytes, caption: str, *, alt: str, suffix: str = "svg"
+    ) -> Page:
         """A figure (or the bytes of its file), with a text for readers who can't see it."""
         content = figure if isinstance(figure, bytes) else figure_bytes(figure, suffix)
         data = base64.b64encode(content).decode("ascii")
-        self._body.append(f'<figure><img src="data:{_MEDIA[suffix]};base64,{data}" alt="{escape(alt)}">'
-                          f"<figcaption>{escape(caption)}</figcaption></figure>")
+        self._body.append(
+            f'<figure><img src="data:{_MEDIA[suffix]};base64,{data}" alt="{escape(alt)}">'
+            f"<figcaption>{escape(caption)}</figcaption></figure>"
+        )
         return self
 
     def details(self, summary: str, data: Any) -> Page:
         """Plain data, such as settings, folded away under a line of text."""
-        self._body.append(f"<details><summary>{escape(summary)}</summary><pre>{escape(to_json(data))}</pre></details>")
+        self._body.append(
+            f"<details><summary>{escape(summary)}</summary><pre>{escape(to_json(data))}</pre></details>"
+        )
         return self
 
     def footer(self, text: str) -> Page:
@@ -81,12 +103,25 @@ class Page:
         """The page. Its policy forbids the browser to load anything from elsewhere."""
         css = (files(__package__) / "page.css").read_text(encoding="utf-8")
         policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
-        return "\n".join([
-            "<!doctype html>", '<html lang="en">', "<head>", '<meta charset="utf-8">',
-            f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            f"<title>{escape(self.title)}</title>", f"<style>\n{css}</style>", "</head>", "<body>",
-            *self._body, self._footer, "</body>", "</html>", ""])
+        return "\n".join(
+            [
+                "<!doctype html>",
+                '<html lang="en">',
+                "<head>",
+                '<meta charset="utf-8">',
+                f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
+                '<meta name="viewport" content="width=device-width, initial-scale=1">',
+                f"<title>{escape(self.title)}</title>",
+                f"<style>\n{css}</style>",
+                "</head>",
+                "<body>",
+                *self._body,
+                self._footer,
+                "</body>",
+                "</html>",
+                "",
+            ]
+        )
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write the page. InputError when the file exists already or can't be written."""

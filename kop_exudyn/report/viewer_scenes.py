@@ -1,27 +1,28 @@
 """From designs, simulations and results to what the 3D page shows."""
+
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Iterable, Mapping, Sequence
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..analysis.kit_result import KitResult
-from ..analysis.strength import design_strength
+from ..drawing.colours import kit_colours
 from ..equilibrium.newton import Equilibrium, solve
 from ..errors import SimulationFailure
-from ..io.colours import kit_colours
-from ..io.pieces import DesignPieces, PartsList, parts_list_of
-from ..io.placement import PlacedPieces
+from ..fabrication.pieces import DesignPieces, PartsList, parts_list_of
+from ..fabrication.placement import PlacedPieces
+from ..geometry.triangles import TriangleSurface
 from ..kit.kinds import PartKind, part_kind
-from ..optimize.fitting import Placement, TargetFitting
-from ..optimize.objective import Evaluation
 from ..scene.scene import Scene
-from ..scene.surface import TriangleSurface
+from ..search.objective import Evaluation
+from ..search.result import KitResult
 from ..structures.base import Design, Target
+from ..structures.fitting import Placement, TargetFitting
+from ..structures.strength import design_strength
 from .clipping import clipped
 from .viewer import ViewerDesign, ViewerPart, ViewerRods, ViewerScene, ViewerState
 
@@ -35,7 +36,8 @@ _NEIGHBOURS = 3  # of a joint: as far as the farthest of them, the target is dra
 def kit_scene(result: KitResult, *, frames: int = 0, title: str | None = None) -> ViewerScene:
     """The designs of a kit optimisation in all stages, inputs first.
 
-    frames : how many states on the way to the opening to solve for, for the assigned stage of actuated designs
+    frames : how many states on the way to the opening to solve for, for the assigned stage of
+        actuated designs
     """
     parts = parts_list_of(result)
     designs = []
@@ -45,18 +47,26 @@ def kit_scene(result: KitResult, *, frames: int = 0, title: str | None = None) -
         for stage, found in result.stages.items():
             outcome = found.designs[n]
             if isinstance(outcome, Evaluation):
-                states += drawing.states(stage, outcome.equilibria, frames if stage == "assigned" else 0)
+                states += drawing.states(
+                    stage, outcome.equilibria, frames if stage == "assigned" else 0
+                )
             else:
                 failed[stage] = outcome.reason
         designs.append(drawing.finish(states, failed))
     sizes = " and ".join(f"{count} {kind}" for kind, count in result.kit.sizes.items())
-    return ViewerScene(title or f"{sizes} parts for {len(designs)} designs", designs, viewer_parts(parts))
+    return ViewerScene(
+        title or f"{sizes} parts for {len(designs)} designs", designs, viewer_parts(parts)
+    )
 
 
-def design_scene(design: Design, equilibria: Mapping[str, Equilibrium], *, frames: int = 0) -> ViewerScene:
+def design_scene(
+    design: Design, equilibria: Mapping[str, Equilibrium], *, frames: int = 0
+) -> ViewerScene:
     """One design in its final states, as `kop simulate` finds them."""
     drawing = _Drawing(DesignPieces(design, ()), None)
-    return ViewerScene(design.name, [drawing.finish(drawing.states("input", equilibria, frames), {})])
+    return ViewerScene(
+        design.name, [drawing.finish(drawing.states("input", equilibria, frames), {})]
+    )
 
 
 def viewer_parts(parts: PartsList) -> list[ViewerPart]:
@@ -65,15 +75,26 @@ def viewer_parts(parts: PartsList) -> list[ViewerPart]:
     colours = kit_colours(parts.kit.sizes)
     for kind, values in parts.kit.parts.items():
         for k, colour in enumerate(colours[kind]):
-            found.append(ViewerPart(parts.labels[kind][k], kind, colour, _dimensions(part_kind(kind), values[k]),
-                                    parts.counts[kind][:, k].tolist()))
+            found.append(
+                ViewerPart(
+                    parts.labels[kind][k],
+                    kind,
+                    colour,
+                    _dimensions(part_kind(kind), values[k]),
+                    parts.counts[kind][:, k].tolist(),
+                )
+            )
     return found
 
 
-def opening_path(design: Design, equilibrium: Equilibrium, role: str, frames: int) -> list[Equilibrium]:
-    """States of a role on the way from its opening back towards the closed state, as far as they can be followed.
+def opening_path(
+    design: Design, equilibrium: Equilibrium, role: str, frames: int
+) -> list[Equilibrium]:
+    """States of a role on the way from its opening back towards the closed state, as far as they
+    can be followed.
 
-    The closed state's opening is that of the design's other actuated role; without one there is no path.
+    The closed state's opening is that of the design's other actuated role; without one there is no
+    path.
     """
     closed = [r.opening for r in design.roles if r.name != role and r.opening is not None]
     if equilibrium.opening is None or not closed:
@@ -81,9 +102,16 @@ def opening_path(design: Design, equilibrium: Equilibrium, role: str, frames: in
     shares, path, last = np.linspace(1, _LEAST_SHARE, frames + 1)[1:], [], equilibrium
     for share in shares:
         try:
-            last = solve(design.systems[role], last.q, last, closed[0] + share * (equilibrium.opening - closed[0]))
+            last = solve(
+                design.systems[role],
+                last.q,
+                last,
+                closed[0] + share * (equilibrium.opening - closed[0]),
+            )
         except SimulationFailure as failure:
-            log.info("%s: the opening is shown from %.0f %% on: %s", design.name, 100 * share, failure)
+            log.info(
+                "%s: the opening is shown from %.0f %% on: %s", design.name, 100 * share, failure
+            )
             break
         path.append(last)
     return path
@@ -112,8 +140,11 @@ class _Drawing:
     def placed(self) -> dict[str, PlacedPieces]:
         return {role.name: PlacedPieces.of(self.pieces, role.name) for role in self.design.roles}
 
-    def states(self, stage: str, equilibria: Mapping[str, Equilibrium], frames: int = 0) -> list[ViewerState]:
-        """All roles of a stage; the fitted one at its best placement, with the frames of its opening."""
+    def states(
+        self, stage: str, equilibria: Mapping[str, Equilibrium], frames: int = 0
+    ) -> list[ViewerState]:
+        """All roles of a stage; the fitted one at its best placement, with the frames of its
+        opening."""
         found, fitted = [], self.design.fitted_role.name
         for role, equilibrium in equilibria.items():
             if role != fitted:
@@ -124,44 +155,63 @@ class _Drawing:
             off = f"off target: max {fit.max_percent:.2g} %, mean {fit.mean_percent:.2g} %"
             found.append(replace(state, note=" · ".join(filter(None, (off, state.note)))))
             path = opening_path(self.design, equilibrium, role, frames) if frames else ()
-            found += [replace(self._state(stage, role, eq, fit.placement), final=False) for eq in path]
+            found += [
+                replace(self._state(stage, role, eq, fit.placement), final=False) for eq in path
+            ]
         return found
 
     def finish(self, states: Sequence[ViewerState], failed: Mapping[str, str]) -> ViewerDesign:
         """The design with these states."""
         rods = {role: self._rods(placed) for role, placed in self.placed.items()}
-        return ViewerDesign(self.design.name, rods, states, _target_near(self.design.target), failed)
+        return ViewerDesign(
+            self.design.name, rods, states, _target_near(self.design.target), failed
+        )
 
     def _rods(self, placed: PlacedPieces) -> ViewerRods:
         scene = placed.scene
         half = 0.5 * scene.size / _SLENDERNESS
         plain = np.array([[half, half], [-half, half], [-half, -half], [half, -half]])
-        outlines = [plain if chain.section is None else chain.section.outline for chain in scene.chains]
+        outlines = [
+            plain if chain.section is None else chain.section.outline for chain in scene.chains
+        ]
         distinct = list({id(outline): outline for outline in outlines}.values())
         place = {id(outline): k for k, outline in enumerate(distinct)}
         return ViewerRods(
             np.array([len(chain.nodes) for chain in scene.chains]),
-            np.array([self._number(piece) for piece in placed.chain_pieces]), distinct,
+            np.array([self._number(piece) for piece in placed.chain_pieces]),
+            distinct,
             np.array([place[id(outline)] for outline in outlines]),
-            np.array([self._number(placed.pieces.by_parameter.get(p)) for p in placed.corners], dtype=int))
+            np.array(
+                [self._number(placed.pieces.by_parameter.get(p)) for p in placed.corners], dtype=int
+            ),
+        )
 
     def _number(self, piece) -> int:
         """The part's place in `viewer_parts`, -1 for none."""
         if piece is None or self.parts is None:
             return -1
         sizes = self.parts.kit.sizes
-        return sum(sizes[kind] for kind in list(sizes)[:list(sizes).index(piece.kind)]) + piece.part
+        return (
+            sum(sizes[kind] for kind in list(sizes)[: list(sizes).index(piece.kind)]) + piece.part
+        )
 
-    def _state(self, stage: str, role: str, equilibrium: Equilibrium,
-               placement: Placement | None = None) -> ViewerState:
+    def _state(
+        self, stage: str, role: str, equilibrium: Equilibrium, placement: Placement | None = None
+    ) -> ViewerState:
         placed, state = self.placed[role], equilibrium.state
         scene, nodes = placed.scene, _ring_nodes(placed.scene)
         x, R = scene.node_poses(state)
         joints = state.positions[self.design.joints]
-        corners = state.positions[[corner.body for corner in placed.corners.values()]].reshape(-1, 3)
+        corners = state.positions[[corner.body for corner in placed.corners.values()]].reshape(
+            -1, 3
+        )
         deviation = None
         if placement is not None:
-            x, joints, corners = placement.apply(x), placement.apply(joints), placement.apply(corners)
+            x, joints, corners = (
+                placement.apply(x),
+                placement.apply(joints),
+                placement.apply(corners),
+            )
             R = placement.rotation @ R
             distances = np.sqrt(self.surface.closest(x).squared_distances)
             deviation = 100 * distances[nodes] / self.design.target.diagonal
@@ -169,12 +219,24 @@ class _Drawing:
         largest = strength.largest
         utilisation = None if largest is None else _ring_values(scene, strength.utilisation)
         note = "" if largest is None else f"stress: max {100 * largest:.0f} % of its limit"
-        return ViewerState(stage, role, x[nodes], R[nodes], joints, corners, deviation, utilisation,
-                           equilibrium.opening, placed=placement is not None, note=note)
+        return ViewerState(
+            stage,
+            role,
+            x[nodes],
+            R[nodes],
+            joints,
+            corners,
+            deviation,
+            utilisation,
+            equilibrium.opening,
+            placed=placement is not None,
+            note=note,
+        )
 
 
 def _target_near(target: Target) -> tuple[np.ndarray, np.ndarray]:
-    """The target around the joints, cut off at a distance from them: surfaces may go on far beyond the design."""
+    """The target around the joints, cut off at a distance from them: surfaces may go on far beyond
+    the design."""
     tree = cKDTree(target.positions)
     reach = tree.query(target.positions, k=min(_NEIGHBOURS + 1, len(target.positions)))[0].max()
     return clipped(target.vertices, target.faces, tree.query(target.vertices)[0] - reach)
@@ -188,8 +250,13 @@ def _ring_nodes(scene: Scene) -> np.ndarray:
 def _ring_values(scene: Scene, values: np.ndarray) -> np.ndarray:
     """(M,) at every ring the larger value (E,) of the elements beside it, NaN on rigid pieces."""
     found: Iterable[np.ndarray] = (
-        np.fmax(np.append(values[chain.elements], np.nan), np.insert(values[chain.elements], 0, np.nan))
-        if len(chain.elements) else np.full(len(chain.nodes), np.nan) for chain in scene.chains)
+        np.fmax(
+            np.append(values[chain.elements], np.nan), np.insert(values[chain.elements], 0, np.nan)
+        )
+        if len(chain.elements)
+        else np.full(len(chain.nodes), np.nan)
+        for chain in scene.chains
+    )
     return np.concatenate(list(found))
 
 

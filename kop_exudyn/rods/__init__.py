@@ -1,4 +1,5 @@
 """One rod: rotations and rigid motions, cross-sections and materials, the element kernel."""
+
 from pathlib import Path
 
 from .kernel_cache import drop_stale_kernels

@@ -1,16 +1,19 @@
-"""The geometrically exact rod element on SE(3): energy, gradient, Hessian and strain-displacement matrix, compiled.
+"""The geometrically exact rod element on SE(3): energy, gradient, Hessian and strain-displacement
+matrix, compiled.
 
-The element is Exudyn's `ObjectBeamGeometricallyExact` with `NodeRigidBodyRotVecLG` nodes (after Sonneville, Cardona,
-Bruels, CMAME 268, 2014). Two poses H_i = (R_i, x_i); h = log(H_0^-1 H_1) = (u, phi):
+The element is Exudyn's `ObjectBeamGeometricallyExact` with `NodeRigidBodyRotVecLG` nodes (after
+Sonneville, Cardona, Bruels, CMAME 268, 2014). Two poses H_i = (R_i, x_i); h = log(H_0^-1 H_1) = (u,
+phi):
 
-    R = R_0^T R_1,  phi = log R,  p = R_0^T (x_1 - x_0),  u = A(phi) p,  A = I - hat(phi)/2 + c hat(phi)^2
-    W = 1/(2L) e^T K e,   e = h - L gamma,   sigma = K e / L
+    R = R_0^T R_1,  phi = log R,  p = R_0^T (x_1 - x_0),  u = A(phi) p,  A = I - hat(phi)/2 + c
+    hat(phi)^2 W = 1/(2L) e^T K e,   e = h - L gamma,   sigma = K e / L
 
-with gamma (6,) the rest strain measure, (1,0,0,0,0,0) for a straight rod and (1,0,0,kappa) for a pre-curved one.
-Variations are x -> x + dx (global) and R -> R exp(hat(w)) (body frame), in the order (dx_0, w_0, dx_1, w_1).
-The Hessian is B^T (K/L) B + G(sigma); G may be taken at another stress than the current one, which is what the
-mixed-stress Newton iteration does.
+with gamma (6,) the rest strain measure, (1,0,0,0,0,0) for a straight rod and (1,0,0,kappa) for a
+pre-curved one. Variations are x -> x + dx (global) and R -> R exp(hat(w)) (body frame), in the
+order (dx_0, w_0, dx_1, w_1). The Hessian is B^T (K/L) B + G(sigma); G may be taken at another
+stress than the current one, which is what the mixed-stress Newton iteration does.
 """
+
 from __future__ import annotations
 
 import numba as nb
@@ -62,7 +65,9 @@ def strain_displacement(R0, p, phi, c, c1, A, D, B):
     for r in range(3):
         for k in range(3):
             A[r, k] = c * phi[r] * phi[k]
-            D[r, k] = c * (phi[r] * p[k] - 2 * p[r] * phi[k]) + 2 * c1 * (phi[r] * pp - s * p[r]) * phi[k]
+            D[r, k] = (
+                c * (phi[r] * p[k] - 2 * p[r] * phi[k]) + 2 * c1 * (phi[r] * pp - s * p[r]) * phi[k]
+            )
         A[r, r] += 1 - c * s
         D[r, r] += c * pp
     add_hat(A, phi, -0.5)
@@ -87,9 +92,9 @@ def strain_displacement(R0, p, phi, c, c1, A, D, B):
 def geometric_stiffness(R0, p, phi, c, c1, c2, A, sigma, X, T, H):
     """Add G(sigma), the stress part of the Hessian, to the blocks of w_0, dx_1, w_1 in H (12,12).
 
-    G collects the second variations of (u, phi) contracted with sigma: dphi.Mff dphi + 2 dphi.Mfp dp from A(phi) p,
-    the derivative of the Jacobians that turn w_0, w_1 into dphi, and the second variation of p. Blocks below the
-    diagonal are left alone. X (3,9) and T (5,3,3) are scratch.
+    G collects the second variations of (u, phi) contracted with sigma: dphi.Mff dphi + 2 dphi.Mfp
+    dp from A(phi) p, the derivative of the Jacobians that turn w_0, w_1 into dphi, and the second
+    variation of p. Blocks below the diagonal are left alone. X (3,9) and T (5,3,3) are scratch.
     """
     su, sp = sigma[:3], sigma[3:]
     s, pp = dot3(phi, phi), dot3(phi, p)
@@ -105,14 +110,23 @@ def geometric_stiffness(R0, p, phi, c, c1, c2, A, sigma, X, T, H):
     g[2] -= 0.5 * (p[0] * su[1] - p[1] * su[0])
     gph = dot3(g, phi)
 
-    # halves of Mff, d(g . A w_0)/dphi and d(g . A^T w_1)/dphi, since they enter through P^T X + X^T P; and Mfp
+    # halves of Mff, d(g . A w_0)/dphi and d(g . A^T w_1)/dphi, since they enter through P^T X + X^T
+    # P; and Mfp
     M, N0, N1, Q = T[0], T[1], T[2], T[3]
     for r in range(3):
         for k in range(3):
-            M[r, k] = 0.5 * c * (su[r] * p[k] + p[r] * su[k]) + c1 * (kg[r] * phi[k] + phi[r] * kg[k]) \
+            M[r, k] = (
+                0.5 * c * (su[r] * p[k] + p[r] * su[k])
+                + c1 * (kg[r] * phi[k] + phi[r] * kg[k])
                 + 2 * c2 * k0 * phi[r] * phi[k]
-            Q[r, k] = c * (su[r] * phi[k] - 2 * phi[r] * su[k]) + 2 * c1 * phi[r] * (sph * phi[k] - s * su[k])
-            N1[r, k] = 0.5 * (c * (g[r] * phi[k] - 2 * phi[r] * g[k]) + 2 * c1 * phi[r] * (gph * phi[k] - s * g[k]))
+            )
+            Q[r, k] = c * (su[r] * phi[k] - 2 * phi[r] * su[k]) + 2 * c1 * phi[r] * (
+                sph * phi[k] - s * su[k]
+            )
+            N1[r, k] = 0.5 * (
+                c * (g[r] * phi[k] - 2 * phi[r] * g[k])
+                + 2 * c1 * phi[r] * (gph * phi[k] - s * g[k])
+            )
         M[r, r] += -c * sup + c1 * k0
         Q[r, r] += c * sph
         N1[r, r] += 0.5 * c * gph
@@ -123,8 +137,8 @@ def geometric_stiffness(R0, p, phi, c, c1, c2, A, sigma, X, T, H):
     add_hat(N1, g, -0.25)
     add_hat(N0, g, 0.25)
 
-    # P^T X + X^T P with P = (-A, 0, A^T), the variation of phi, and X = M P + Q dp + (N1 w_1 - N0 w_0)/2, where
-    # dp = R0^T dx_1 + hat(p) w_0
+    # P^T X + X^T P with P = (-A, 0, A^T), the variation of phi, and X = M P + Q dp + (N1 w_1 - N0
+    # w_0)/2, where dp = R0^T dx_1 + hat(p) w_0
     for r in range(3):
         for k in range(3):
             X[r, k] = -(M[r, 0] * A[0, k] + M[r, 1] * A[1, k] + M[r, 2] * A[2, k]) - N0[r, k]
@@ -173,10 +187,12 @@ def element_energy(x0, R0, x1, R1, L, gamma, K, p, phi, R, e):
 
 @kernel(fastmath={"contract"})
 def element_hessian(R0, L, K, p, phi, sigma, A, D, B, KB, X, T, H):
-    """Fill B (6,12) and the symmetric H (12,12) = B^T (K/L) B + G(sigma). KB (6,12), X and T are scratch.
+    """Fill B (6,12) and the symmetric H (12,12) = B^T (K/L) B + G(sigma). KB (6,12), X and T are
+    scratch.
 
-    Only blocks of w_0, dx_1 and w_1 are computed: the energy depends on x_1 - x_0, so those of dx_0 are minus dx_1's.
-    phi does not depend on positions, so products with columns of dx_1 have three rows.
+    Only blocks of w_0, dx_1 and w_1 are computed: the energy depends on x_1 - x_0, so those of dx_0
+    are minus dx_1's. phi does not depend on positions, so products with columns of dx_1 have three
+    rows.
     """
     c, c1, c2 = bend_coefficient(dot3(phi, phi))
     strain_displacement(R0, p, phi, c, c1, A, D, B)
@@ -192,9 +208,15 @@ def element_hessian(R0, L, K, p, phi, sigma, A, D, B, KB, X, T, H):
             H[9 + i, k] = KB[0, 9 + i] * B[0, k] + KB[1, 9 + i] * B[1, k] + KB[2, 9 + i] * B[2, k]
     for i in range(3):
         for k in range(3):
-            H[3 + i, 3 + k] += KB[3, 3 + i] * B[3, 3 + k] + KB[4, 3 + i] * B[4, 3 + k] + KB[5, 3 + i] * B[5, 3 + k]
-            H[3 + i, 9 + k] += KB[3, 3 + i] * B[3, 9 + k] + KB[4, 3 + i] * B[4, 9 + k] + KB[5, 3 + i] * B[5, 9 + k]
-            H[9 + i, 9 + k] += KB[3, 9 + i] * B[3, 9 + k] + KB[4, 9 + i] * B[4, 9 + k] + KB[5, 9 + i] * B[5, 9 + k]
+            H[3 + i, 3 + k] += (
+                KB[3, 3 + i] * B[3, 3 + k] + KB[4, 3 + i] * B[4, 3 + k] + KB[5, 3 + i] * B[5, 3 + k]
+            )
+            H[3 + i, 9 + k] += (
+                KB[3, 3 + i] * B[3, 9 + k] + KB[4, 3 + i] * B[4, 9 + k] + KB[5, 3 + i] * B[5, 9 + k]
+            )
+            H[9 + i, 9 + k] += (
+                KB[3, 9 + i] * B[3, 9 + k] + KB[4, 9 + i] * B[4, 9 + k] + KB[5, 9 + i] * B[5, 9 + k]
+            )
     geometric_stiffness(R0, p, phi, c, c1, c2, A, sigma, X, T, H)
     for i in range(3):
         for k in range(3):
@@ -233,10 +255,17 @@ def _evaluate(x0, R0, x1, R1, L, gamma, K, sigma, mixed, W, G, H, e, B):
 
 
 def evaluate(
-    x0: np.ndarray, R0: np.ndarray, x1: np.ndarray, R1: np.ndarray, lengths: np.ndarray, stiffness: np.ndarray,
-    rest_strain: np.ndarray | None = None, stress: np.ndarray | None = None,
+    x0: np.ndarray,
+    R0: np.ndarray,
+    x1: np.ndarray,
+    R1: np.ndarray,
+    lengths: np.ndarray,
+    stiffness: np.ndarray,
+    rest_strain: np.ndarray | None = None,
+    stress: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Energies and derivatives of n separate elements (for tests and for looking; scenes are assembled elsewhere).
+    """Energies and derivatives of n separate elements (for tests and for looking; scenes are
+    assembled elsewhere).
 
     Parameters
     ----------
@@ -252,24 +281,36 @@ def evaluate(
     n = len(lengths)
     if rest_strain is None:
         rest_strain = np.tile([1.0, 0, 0, 0, 0, 0], (n, 1))
-    W, G, H, e, B = np.empty(n), np.empty((n, 12)), np.empty((n, 12, 12)), np.empty((n, 6)), np.empty((n, 6, 12))
+    W, G, H, e, B = (
+        np.empty(n),
+        np.empty((n, 12)),
+        np.empty((n, 12, 12)),
+        np.empty((n, 6)),
+        np.empty((n, 6, 12)),
+    )
     sigma = np.zeros((n, 6)) if stress is None else np.ascontiguousarray(stress, float)
-    _evaluate(x0, R0, x1, R1, lengths, rest_strain, stiffness, sigma, stress is not None, W, G, H, e, B)
+    _evaluate(
+        x0, R0, x1, R1, lengths, rest_strain, stiffness, sigma, stress is not None, W, G, H, e, B
+    )
     return W, G, H, e, B
 
 
 def length_derivative(
     strain: np.ndarray, lengths: np.ndarray, stiffness: np.ndarray, rest_strain: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """dW/dL (n,), dsigma/dL (n, 6) and d2W/dL2 (n,) at fixed poses; strain is e = h - L gamma, (n, 6).
+    """dW/dL (n,), dsigma/dL (n, 6) and d2W/dL2 (n,) at fixed poses; strain is e = h - L gamma, (n,
+    6).
 
     With de/dL = -gamma: dW/dL = -e.Ke/(2 L^2) - gamma.Ke/L,  dsigma/dL = -Ke/L^2 - K gamma/L,
     d2W/dL2 = e.Ke/L^3 + 2 gamma.Ke/L^2 + gamma.K gamma/L.
     """
     Ke, Kg, L = stiffness * strain, stiffness * rest_strain, lengths
     eKe, gKe, gKg = (strain * Ke).sum(1), (rest_strain * Ke).sum(1), (rest_strain * Kg).sum(1)
-    return (-eKe / (2 * L**2) - gKe / L, -Ke / L[:, None] ** 2 - Kg / L[:, None],
-            eKe / L**3 + 2 * gKe / L**2 + gKg / L)
+    return (
+        -eKe / (2 * L**2) - gKe / L,
+        -Ke / L[:, None] ** 2 - Kg / L[:, None],
+        eKe / L**3 + 2 * gKe / L**2 + gKg / L,
+    )
 
 
 def rest_strain_derivative(

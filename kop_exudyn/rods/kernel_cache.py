@@ -1,8 +1,9 @@
 """Compiled kernels on disk, which numba keeps beside their sources.
 
-Numba compiles a kernel anew when its own file changes, but not when a function changes that it calls from another file.
-After an update of the sources it would go on with the old function.
+Numba compiles a kernel anew when its own file changes, but not when a function changes that it
+calls from another file. After an update of the sources it would go on with the old function.
 """
+
 from __future__ import annotations
 
 import time
@@ -13,7 +14,8 @@ _COMPILED = ("*.nbi", "*.nbc")
 
 
 def drop_stale_kernels(package: Path) -> int:
-    """Remove what was compiled before the newest file with kernels was written; returns how many files that were."""
+    """Remove what was compiled before the newest file with kernels was written; returns how many
+    files that were."""
     sources = [file for file in package.rglob("*.py") if _has_kernels(file)]
     newest = min(max((file.stat().st_mtime for file in sources), default=0.0), time.time())
     dropped = 0

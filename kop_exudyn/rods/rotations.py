@@ -1,8 +1,10 @@
-"""Rotations and rigid motions: exponential and logarithm on SO(3) and SE(3), compiled, and their NumPy-array forms.
+"""Rotations and rigid motions: exponential and logarithm on SO(3) and SE(3), compiled, and their
+NumPy-array forms.
 
-Conventions: rotation vectors in radians, matrices act on column vectors, `hat(a) b = a x b`. An increment w of a
-rotation R is a body-frame one, R exp(hat(w)).
+Conventions: rotation vectors in radians, matrices act on column vectors, `hat(a) b = a x b`. An
+increment w of a rotation R is a body-frame one, R exp(hat(w)).
 """
+
 from __future__ import annotations
 
 import math
@@ -12,7 +14,8 @@ import numpy as np
 
 from .kernels import kernel
 
-# Below this squared angle the closed form of c loses digits to cancellation; the series is exact to round-off there.
+# Below this squared angle the closed form of c loses digits to cancellation; the series is exact to
+# round-off there.
 _SERIES_LIMIT = 0.25
 
 
@@ -20,10 +23,19 @@ _SERIES_LIMIT = 0.25
 def bend_coefficient(s):
     """c(s) = (1 - (t/2) cot(t/2)) / s with t = sqrt(s), and its first two derivatives in s.
 
-    It is the coefficient of hat(phi)^2 in the inverse left Jacobian of SO(3), A(phi) = I - hat(phi)/2 + c hat(phi)^2.
+    It is the coefficient of hat(phi)^2 in the inverse left Jacobian of SO(3), A(phi) = I -
+    hat(phi)/2 + c hat(phi)^2.
     """
     if s < _SERIES_LIMIT:
-        b = (1 / 12, 1 / 720, 1 / 30240, 1 / 1209600, 1 / 47900160, 691 / 1307674368000, 1 / 74724249600)
+        b = (
+            1 / 12,
+            1 / 720,
+            1 / 30240,
+            1 / 1209600,
+            1 / 47900160,
+            691 / 1307674368000,
+            1 / 74724249600,
+        )
         c = b[0] + s * (b[1] + s * (b[2] + s * (b[3] + s * (b[4] + s * (b[5] + s * b[6])))))
         c1 = b[1] + s * (2 * b[2] + s * (3 * b[3] + s * (4 * b[4] + s * (5 * b[5] + s * 6 * b[6]))))
         c2 = 2 * b[2] + s * (6 * b[3] + s * (12 * b[4] + s * (20 * b[5] + s * 30 * b[6])))
@@ -42,20 +54,41 @@ def bend_coefficient(s):
 
 @kernel(inline="always")
 def log_into(R, phi):
-    """Write the rotation vector of R (angle at most pi) into phi, through the quaternion with the largest component."""
+    """Write the rotation vector of R (angle at most pi) into phi, through the quaternion with the
+    largest component."""
     trace = R[0, 0] + R[1, 1] + R[2, 2]
     if trace > 0:
         S = math.sqrt(trace + 1) * 2
-        w, x, y, z = 0.25 * S, (R[2, 1] - R[1, 2]) / S, (R[0, 2] - R[2, 0]) / S, (R[1, 0] - R[0, 1]) / S
+        w, x, y, z = (
+            0.25 * S,
+            (R[2, 1] - R[1, 2]) / S,
+            (R[0, 2] - R[2, 0]) / S,
+            (R[1, 0] - R[0, 1]) / S,
+        )
     elif R[0, 0] > R[1, 1] and R[0, 0] > R[2, 2]:
         S = math.sqrt(1 + R[0, 0] - R[1, 1] - R[2, 2]) * 2
-        w, x, y, z = (R[2, 1] - R[1, 2]) / S, 0.25 * S, (R[0, 1] + R[1, 0]) / S, (R[0, 2] + R[2, 0]) / S
+        w, x, y, z = (
+            (R[2, 1] - R[1, 2]) / S,
+            0.25 * S,
+            (R[0, 1] + R[1, 0]) / S,
+            (R[0, 2] + R[2, 0]) / S,
+        )
     elif R[1, 1] > R[2, 2]:
         S = math.sqrt(1 + R[1, 1] - R[0, 0] - R[2, 2]) * 2
-        w, x, y, z = (R[0, 2] - R[2, 0]) / S, (R[0, 1] + R[1, 0]) / S, 0.25 * S, (R[1, 2] + R[2, 1]) / S
+        w, x, y, z = (
+            (R[0, 2] - R[2, 0]) / S,
+            (R[0, 1] + R[1, 0]) / S,
+            0.25 * S,
+            (R[1, 2] + R[2, 1]) / S,
+        )
     else:
         S = math.sqrt(1 + R[2, 2] - R[0, 0] - R[1, 1]) * 2
-        w, x, y, z = (R[1, 0] - R[0, 1]) / S, (R[0, 2] + R[2, 0]) / S, (R[1, 2] + R[2, 1]) / S, 0.25 * S
+        w, x, y, z = (
+            (R[1, 0] - R[0, 1]) / S,
+            (R[0, 2] + R[2, 0]) / S,
+            (R[1, 2] + R[2, 1]) / S,
+            0.25 * S,
+        )
     if w < 0:
         w, x, y, z = -w, -x, -y, -z
     n = math.sqrt(x * x + y * y + z * z)
@@ -65,7 +98,8 @@ def log_into(R, phi):
 
 @kernel(inline="always")
 def exp_into(w, R):
-    """Write exp(hat(w)) into R (Rodrigues; half-angle form, so that no digits cancel at small angles)."""
+    """Write exp(hat(w)) into R (Rodrigues; half-angle form, so that no digits cancel at small
+    angles)."""
     s = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
     t = math.sqrt(s)
     if t < 1e-6:
@@ -98,7 +132,8 @@ def _log_all(R, out):
 
 @nb.njit(cache=True)
 def compose_increments(R, w, out):
-    """out_i = R_i exp(hat(w_i)), followed by one Newton-Schulz step that keeps the columns orthonormal.
+    """out_i = R_i exp(hat(w_i)), followed by one Newton-Schulz step that keeps the columns
+    orthonormal.
 
     Thousands of products would otherwise drift off SO(3) by round-off.
     """
@@ -158,10 +193,11 @@ def axes_along_z(axis: np.ndarray) -> np.ndarray:
 
 
 def exp_se3(h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rigid motions of twists h = (u, phi) (..., 6): translations (..., 3) and rotations (..., 3, 3).
+    """Rigid motions of twists h = (u, phi) (..., 6): translations (..., 3) and rotations (..., 3,
+    3).
 
-    The translation is p = A(phi)^-1 u, with A the inverse left Jacobian, so that h is the element's generalised
-    relative motion again (Sonneville, Cardona, Bruels, CMAME 2014).
+    The translation is p = A(phi)^-1 u, with A the inverse left Jacobian, so that h is the element's
+    generalised relative motion again (Sonneville, Cardona, Bruels, CMAME 2014).
     """
     h = np.asarray(h, float)
     flat = h.reshape(-1, 6)

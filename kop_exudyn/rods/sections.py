@@ -1,19 +1,22 @@
 """Materials and cross-sections: the six stiffnesses of a rod, and the points where stress is read.
 
-Local axes of a rod: x along the rod, y and z the section's principal axes. A rectangle's width lies along y, its
-height along z.
+Local axes of a rod: x along the rod, y and z the section's principal axes. A rectangle's width lies
+along y, its height along z.
 """
+
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Callable, Mapping
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 
 _LARGEST = 1e60  # its fourth power is still a number
-# Odd terms of the torsion series; the remainder of n terms falls with n^-5, so this many reach round-off.
+# Odd terms of the torsion series; the remainder of n terms falls with n^-5, so this many reach
+# round-off.
 _TORSION_TERMS = np.arange(1, 400, 2)
 
 
@@ -35,7 +38,11 @@ class Material:
     def __post_init__(self) -> None:
         _positive("material.young", self.young)
         if not -1 < self.poisson <= 0.5:
-            raise InputError("Poisson's ratio must lie in (-1, 0.5]", field="material.poisson", value=self.poisson)
+            raise InputError(
+                "Poisson's ratio must lie in (-1, 0.5]",
+                field="material.poisson",
+                value=self.poisson,
+            )
         for name in ("density", "elastic_limit"):
             if getattr(self, name) is not None:
                 _positive(f"material.{name}", getattr(self, name))
@@ -53,7 +60,8 @@ class Section:
     inertia_y, inertia_z : second moments about y and z, length^4
     torsion : torsion constant J, length^4
     shear_y, shear_z : shear correction factors
-    outline : (k, 2) corners (y, z) of the section, counter-clockwise: drawn, and used as stress points
+    outline : (k, 2) corners (y, z) of the section, counter-clockwise: drawn, and used as stress
+        points
     torsion_modulus : J / W_t, so that the largest shear stress is torque * this / J; length
     """
 
@@ -67,19 +75,27 @@ class Section:
     torsion_modulus: float
 
     def stiffness(self, material: Material) -> np.ndarray:
-        """(EA, k_y GA, k_z GA, GJ, EI_y, EI_z): stiffness (6,) against stretch, shears, twist and bendings."""
+        """(EA, k_y GA, k_z GA, GJ, EI_y, EI_z): stiffness (6,) against stretch, shears, twist and
+        bendings."""
         E, G = material.young, material.shear_modulus
-        return np.array([
-            E * self.area, self.shear_y * G * self.area, self.shear_z * G * self.area,
-            G * self.torsion, E * self.inertia_y, E * self.inertia_z,
-        ])
+        return np.array(
+            [
+                E * self.area,
+                self.shear_y * G * self.area,
+                self.shear_z * G * self.area,
+                G * self.torsion,
+                E * self.inertia_y,
+                E * self.inertia_z,
+            ]
+        )
 
 
 def rectangle(width: float, height: float) -> Section:
     """Solid rectangle, width along y, height along z.
 
-    Torsion constant by Saint-Venant's series (Timoshenko and Goodier, Theory of Elasticity, art. 109), with the
-    shorter side b and the longer a:  J = a b^3 / 3 (1 - 192 b / (pi^5 a) sum_odd tanh(n pi a / 2 b) / n^5).
+    Torsion constant by Saint-Venant's series (Timoshenko and Goodier, Theory of Elasticity, art.
+    109), with the shorter side b and the longer a:  J = a b^3 / 3 (1 - 192 b / (pi^5 a) sum_odd
+    tanh(n pi a / 2 b) / n^5).
     """
     _positive("section.width", width)
     _positive("section.height", height)
@@ -87,12 +103,18 @@ def rectangle(width: float, height: float) -> Section:
     n = _TORSION_TERMS
     ratio = n * np.pi * a / (2 * b)
     torsion = a * b**3 / 3 * (1 - 192 * b / (np.pi**5 * a) * np.sum(np.tanh(ratio) / n**5))
-    # largest shear stress, at the middle of the longer side: tau = G theta b (1 - 8/pi^2 sum 1/(n^2 cosh))
+    # largest shear stress, at the middle of the longer side: tau = G theta b (1 - 8/pi^2 sum 1/(n^2
+    # cosh))
     decay = np.sum(np.exp(-ratio) * 2 / (1 + np.exp(-2 * ratio)) / n**2)
     y, z = width / 2, height / 2
     return Section(
-        area=width * height, inertia_y=width * height**3 / 12, inertia_z=height * width**3 / 12, torsion=torsion,
-        shear_y=5 / 6, shear_z=5 / 6, outline=np.array([[y, z], [-y, z], [-y, -z], [y, -z]]),
+        area=width * height,
+        inertia_y=width * height**3 / 12,
+        inertia_z=height * width**3 / 12,
+        torsion=torsion,
+        shear_y=5 / 6,
+        shear_z=5 / 6,
+        outline=np.array([[y, z], [-y, z], [-y, -z], [y, -z]]),
         torsion_modulus=b * (1 - 8 / np.pi**2 * decay),
     )
 
@@ -103,18 +125,37 @@ def circle(radius: float) -> Section:
     turns = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     quarter = np.pi * radius**4 / 4
     return Section(
-        area=np.pi * radius**2, inertia_y=quarter, inertia_z=quarter, torsion=2 * quarter, shear_y=0.9, shear_z=0.9,
-        outline=radius * np.stack([np.cos(turns), np.sin(turns)], axis=1), torsion_modulus=radius,
+        area=np.pi * radius**2,
+        inertia_y=quarter,
+        inertia_z=quarter,
+        torsion=2 * quarter,
+        shear_y=0.9,
+        shear_z=0.9,
+        outline=radius * np.stack([np.cos(turns), np.sin(turns)], axis=1),
+        torsion_modulus=radius,
     )
 
 
 def general(
-    area: float, inertia_y: float, inertia_z: float, torsion: float, shear_y: float = 5 / 6, shear_z: float = 5 / 6,
-    outline: Any = None, torsion_modulus: float | None = None,
+    area: float,
+    inertia_y: float,
+    inertia_z: float,
+    torsion: float,
+    shear_y: float = 5 / 6,
+    shear_z: float = 5 / 6,
+    outline: Any = None,
+    torsion_modulus: float | None = None,
 ) -> Section:
-    """A section given by its integrals. Without an outline it is drawn as the rectangle of the same inertia."""
-    for name, value in (("area", area), ("inertia_y", inertia_y), ("inertia_z", inertia_z), ("torsion", torsion),
-                        ("shear_y", shear_y), ("shear_z", shear_z)):
+    """A section given by its integrals. Without an outline it is drawn as the rectangle of the same
+    inertia."""
+    for name, value in (
+        ("area", area),
+        ("inertia_y", inertia_y),
+        ("inertia_z", inertia_z),
+        ("torsion", torsion),
+        ("shear_y", shear_y),
+        ("shear_z", shear_z),
+    ):
         _positive(f"section.{name}", value)
     if outline is None:
         y, z = np.sqrt(3 * inertia_z / area), np.sqrt(3 * inertia_y / area)
@@ -123,8 +164,17 @@ def general(
         outline = np.asarray(outline, float)
     except (TypeError, ValueError):
         outline = np.empty(0)
-    if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3 or not np.isfinite(outline).all():
-        raise InputError("an outline needs at least three finite points (y, z)", field="section.outline", value=outline)
+    if (
+        outline.ndim != 2
+        or outline.shape[1] != 2
+        or len(outline) < 3
+        or not np.isfinite(outline).all()
+    ):
+        raise InputError(
+            "an outline needs at least three finite points (y, z)",
+            field="section.outline",
+            value=outline,
+        )
     if torsion_modulus is not None:
         _positive("section.torsion_modulus", torsion_modulus)
     else:
@@ -133,16 +183,25 @@ def general(
 
 
 def section_from_dict(data: Mapping[str, Any]) -> Section:
-    """The section that a design file describes: {"type": "rectangle" | "circle" | "general", ...}."""
-    makers: dict[str, Callable[..., Section]] = {"rectangle": rectangle, "circle": circle, "general": general}
+    """The section that a design file describes: {"type": "rectangle" | "circle" | "general",
+    ...}."""
+    makers: dict[str, Callable[..., Section]] = {
+        "rectangle": rectangle,
+        "circle": circle,
+        "general": general,
+    }
     options = dict(data)
     kind = options.pop("type", None)
     if kind not in makers:
-        raise InputError(f"unknown section type (known: {', '.join(makers)})", field="section.type", value=kind)
+        raise InputError(
+            f"unknown section type (known: {', '.join(makers)})", field="section.type", value=kind
+        )
     try:
         return makers[kind](**options)
     except TypeError as error:
-        raise InputError(f"wrong fields for a {kind} section: {error}", field="section", value=data) from None
+        raise InputError(
+            f"wrong fields for a {kind} section: {error}", field="section", value=data
+        ) from None
 
 
 def material_from_dict(data: Mapping[str, Any]) -> Material:
@@ -150,9 +209,15 @@ def material_from_dict(data: Mapping[str, Any]) -> Material:
     try:
         return Material(**data)
     except TypeError as error:
-        raise InputError(f"wrong fields for a material: {error}", field="material", value=data) from None
+        raise InputError(
+            f"wrong fields for a material: {error}", field="material", value=data
+        ) from None
 
 
 def _positive(field: str, value: float) -> None:
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.floating, np.integer)) or not 0 < value < _LARGEST:
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, (int, float, np.floating, np.integer))
+        or not 0 < value < _LARGEST
+    ):
         raise InputError("must be a positive number", field=field, value=value)

@@ -1,13 +1,16 @@
-"""Linear actuators: the deployment energy of umbrella cells, which pushes the two plates of a cell apart.
+"""Linear actuators: the deployment energy of umbrella cells, which pushes the two plates of a cell
+apart.
 
-Each actuator joins two bodies, the top and the bottom plate of one cell. With the plates' outward normals n_t = R_t e_z
-and n_b = R_b e_z, the axis a = (n_t - n_b)/|n_t - n_b|, the gap u = x_t - x_b and the spacing h = a.u, its energy is
+Each actuator joins two bodies, the top and the bottom plate of one cell. With the plates' outward
+normals n_t = R_t e_z and n_b = R_b e_z, the axis a = (n_t - n_b)/|n_t - n_b|, the gap u = x_t - x_b
+and the spacing h = a.u, its energy is
 
     w [ k_a n_t.n_b + k_x/2 (h - h*)^2 + k_t/2 (|u|^2 - h^2) ]
 
-(Ren et al., Umbrella meshes, ACM TOG 41(4), 2022): plates become parallel, reach the spacing h* and don't slide
-sideways.
+(Ren et al., Umbrella meshes, ACM TOG 41(4), 2022): plates become parallel, reach the spacing h* and
+don't slide sideways.
 """
+
 from __future__ import annotations
 
 from typing import Any
@@ -33,17 +36,30 @@ class LinearActuators:
     Raises InputError for weights that are negative or not finite.
     """
 
-    def __init__(self, top: Any, bottom: Any, spacing: Any, weight: Any = 1.0, *, alignment: float = 1.0,
-                 extension: float = 1.0, shear: float = 1.0):
+    def __init__(
+        self,
+        top: Any,
+        bottom: Any,
+        spacing: Any,
+        weight: Any = 1.0,
+        *,
+        alignment: float = 1.0,
+        extension: float = 1.0,
+        shear: float = 1.0,
+    ):
         self.top, self.bottom = np.array(top, int).reshape(-1), np.array(bottom, int).reshape(-1)
         m = len(self.top)
         self.spacing = np.array(np.broadcast_to(spacing, m), float)
         self.weight = np.array(np.broadcast_to(weight, m), float)
         if not (np.isfinite(self.weight).all() and (self.weight >= 0).all()):
-            raise InputError("weights of actuators must be finite and not negative", field="actuators.weight")
+            raise InputError(
+                "weights of actuators must be finite and not negative", field="actuators.weight"
+            )
         self.alignment, self.extension, self.shear = alignment, extension, shear
         six = np.arange(6)
-        self.dofs = np.concatenate([6 * self.top[:, None] + six, 6 * self.bottom[:, None] + six], axis=1)
+        self.dofs = np.concatenate(
+            [6 * self.top[:, None] + six, 6 * self.bottom[:, None] + six], axis=1
+        )
 
     @property
     def pairs(self) -> np.ndarray:
@@ -52,8 +68,15 @@ class LinearActuators:
 
     def weighted(self, weight: Any) -> LinearActuators:
         """The same actuators with other weights."""
-        return LinearActuators(self.top, self.bottom, self.spacing, weight, alignment=self.alignment,
-                               extension=self.extension, shear=self.shear)
+        return LinearActuators(
+            self.top,
+            self.bottom,
+            self.spacing,
+            weight,
+            alignment=self.alignment,
+            extension=self.extension,
+            shear=self.shear,
+        )
 
     def spacings(self, state: State) -> np.ndarray:
         """Spacings h (m,) along the mean axis."""
@@ -65,8 +88,10 @@ class LinearActuators:
         n_t, n_b, axis, _, gap = self._geometry(state)
         h = _dot(axis, gap)
         return self.weight * (
-            self.alignment * _dot(n_t, n_b) + 0.5 * self.extension * (h - self.spacing) ** 2
-            + 0.5 * self.shear * (_dot(gap, gap) - h * h))
+            self.alignment * _dot(n_t, n_b)
+            + 0.5 * self.extension * (h - self.spacing) ** 2
+            + 0.5 * self.shear * (_dot(gap, gap) - h * h)
+        )
 
     def energy(self, state: State) -> float:
         return float(self.energies(state).sum())
@@ -82,7 +107,10 @@ class LinearActuators:
         curve = self.extension - self.shear
 
         # derivatives in the normals and in the gap; the two normals enter h by their difference
-        g_t, g_b = slope[:, None] * h_n + self.alignment * n_b, -slope[:, None] * h_n + self.alignment * n_t
+        g_t, g_b = (
+            slope[:, None] * h_n + self.alignment * n_b,
+            -slope[:, None] * h_n + self.alignment * n_t,
+        )
         g_u = slope[:, None] * axis + self.shear * gap
         H_nn = slope[:, None, None] * h_nn + curve * _outer(h_n, h_n)
         H_nu = slope[:, None, None] * h_nu + curve * _outer(h_n, axis)
@@ -102,7 +130,9 @@ class LinearActuators:
         H[:, 9:12, 9:12] = J_bT @ H_nn @ J_b + _normal_curvature(state.rotations[self.bottom], g_b)
         H[:, 3:6, 9:12] = J_tT @ (self.alignment * _I3 - H_nn) @ J_b
         for row, column in ((0, 3), (6, 3), (6, 0), (0, 9), (6, 9), (9, 3)):
-            H[:, row:row + 3, column:column + 3] = np.swapaxes(H[:, column:column + 3, row:row + 3], 1, 2)
+            H[:, row : row + 3, column : column + 3] = np.swapaxes(
+                H[:, column : column + 3, row : row + 3], 1, 2
+            )
         return float(energies.sum()), self.weight[:, None] * g, self.weight[:, None, None] * H
 
     def _geometry(self, state: State) -> tuple[np.ndarray, ...]:
@@ -115,11 +145,15 @@ class LinearActuators:
 
     @staticmethod
     def _spacing_derivatives(axis, length, gap, h) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """h = d.u/|d|: h_d (m, 3), h_dd and h_du (m, 3, 3), with d the difference of the normals."""
+        """h = d.u/|d|: h_d (m, 3), h_dd and h_du (m, 3, 3), with d the difference of the
+        normals."""
         across = gap - h[:, None] * axis
         project = _I3 - _outer(axis, axis)
         mixed = _outer(axis, across)
-        h_dd = -(h[:, None, None] * project + mixed + np.swapaxes(mixed, 1, 2)) / length[:, None, None] ** 2
+        h_dd = (
+            -(h[:, None, None] * project + mixed + np.swapaxes(mixed, 1, 2))
+            / length[:, None, None] ** 2
+        )
         return across / length[:, None], h_dd, project / length[:, None, None]
 
 

@@ -1,4 +1,6 @@
-"""Compiled assembly of a scene's rods: energy, gradient and Hessian straight into the factorisation's arrays."""
+"""Compiled assembly of a scene's rods: energy, gradient and Hessian straight into the
+factorisation's arrays."""
+
 from __future__ import annotations
 
 import math
@@ -14,7 +16,8 @@ ENERGY, GRADIENT, HESSIAN = 0, 1, 2
 
 @kernel(inline="always")
 def node_pose(xb, Rb, h, angles, axes, centres, plain, C, o, x, R, EC, y):
-    """Pose (x, R) of a node behind hinge h (-1: none), with EC = E(a) C and y = p + E(a) o left for the variations.
+    """Pose (x, R) of a node behind hinge h (-1: none), with EC = E(a) C and y = p + E(a) o left for
+    the variations.
 
     E(a) = cos a I + sin a hat(n) + (1 - cos a) n n^T turns about the hinge's axis n.
     """
@@ -58,7 +61,8 @@ def node_pose(xb, Rb, h, angles, axes, centres, plain, C, o, x, R, EC, y):
 
 @kernel(inline="always")
 def node_map(Rb, h, axes, centres, C, EC, y, T, d):
-    """T (6,7): node increments (dx, w) from body increments and hinge angle, with d = n x (y - p) left behind.
+    """T (6,7): node increments (dx, w) from body increments and hinge angle, with d = n x (y - p)
+    left behind.
 
     dx = dx_b - R_b hat(y) w_b + R_b d da,   w = (EC)^T w_b + C^T n da
     """
@@ -120,10 +124,11 @@ def transform_rows(M, at6, plain, T, out, at7):
 
 @kernel
 def map_curvature(Rb, h, axes, EC, y, T, d, force, moment, H, at):
-    """Add the second variation of the node map, contracted with the node's force (global) and moment (node axes).
+    """Add the second variation of the node map, contracted with the node's force (global) and
+    moment (node axes).
 
-    f = R_b^T force, b = C^T n:  w.(f y^T)w - (f.y) w.w,  w.(d x f) da,  f.(n x d) da^2,  and half of
-    w.EC (b x moment) da.
+    f = R_b^T force, b = C^T n:  w.(f y^T)w - (f.y) w.w,  w.(d x f) da,  f.(n x d) da^2,  and half
+    of w.EC (b x moment) da.
     """
     f0 = Rb[0, 0] * force[0] + Rb[1, 0] * force[1] + Rb[2, 0] * force[2]
     f1 = Rb[0, 1] * force[0] + Rb[1, 1] * force[1] + Rb[2, 1] * force[2]
@@ -142,10 +147,18 @@ def map_curvature(Rb, h, axes, EC, y, T, d, force, moment, H, at):
     t0 = b1 * moment[2] - b2 * moment[1]
     t1 = b2 * moment[0] - b0 * moment[2]
     t2 = b0 * moment[1] - b1 * moment[0]
-    H[at + 3, at + 6] += d[1] * f2 - d[2] * f1 + 0.5 * (EC[0, 0] * t0 + EC[0, 1] * t1 + EC[0, 2] * t2)
-    H[at + 4, at + 6] += d[2] * f0 - d[0] * f2 + 0.5 * (EC[1, 0] * t0 + EC[1, 1] * t1 + EC[1, 2] * t2)
-    H[at + 5, at + 6] += d[0] * f1 - d[1] * f0 + 0.5 * (EC[2, 0] * t0 + EC[2, 1] * t1 + EC[2, 2] * t2)
-    H[at + 6, at + 6] += f0 * (n1 * d[2] - n2 * d[1]) + f1 * (n2 * d[0] - n0 * d[2]) + f2 * (n0 * d[1] - n1 * d[0])
+    H[at + 3, at + 6] += (
+        d[1] * f2 - d[2] * f1 + 0.5 * (EC[0, 0] * t0 + EC[0, 1] * t1 + EC[0, 2] * t2)
+    )
+    H[at + 4, at + 6] += (
+        d[2] * f0 - d[0] * f2 + 0.5 * (EC[1, 0] * t0 + EC[1, 1] * t1 + EC[1, 2] * t2)
+    )
+    H[at + 5, at + 6] += (
+        d[0] * f1 - d[1] * f0 + 0.5 * (EC[2, 0] * t0 + EC[2, 1] * t1 + EC[2, 2] * t2)
+    )
+    H[at + 6, at + 6] += (
+        f0 * (n1 * d[2] - n2 * d[1]) + f1 * (n2 * d[0] - n0 * d[2]) + f2 * (n0 * d[1] - n1 * d[0])
+    )
 
 
 def scratch_arrays() -> tuple[np.ndarray, ...]:
@@ -158,17 +171,68 @@ def scratch_arrays() -> tuple[np.ndarray, ...]:
 
 @kernel
 def assemble_rods(
-    order, positions, rotations, angles, axes, centres, node_body, node_hinge, plain, frame, offset, elements, L, gamma,
-    K, weight, stress, mixed, rows, slots, gradient, values, strain, B14, scratch,
+    order,
+    positions,
+    rotations,
+    angles,
+    axes,
+    centres,
+    node_body,
+    node_hinge,
+    plain,
+    frame,
+    offset,
+    elements,
+    L,
+    gamma,
+    K,
+    weight,
+    stress,
+    mixed,
+    rows,
+    slots,
+    gradient,
+    values,
+    strain,
+    B14,
+    scratch,
 ):
-    """Elastic energy and load potential; at GRADIENT also the gradient, at HESSIAN also values, and B14 (E,6,14).
+    """Elastic energy and load potential; at GRADIENT also the gradient, at HESSIAN also values, and
+    B14 (E,6,14).
 
-    stress (E, 6) is used in the geometric part when mixed, else the current stress is. weight has no rows when the
-    scene has none. strain e (E, 6) is always written. scratch : of `scratch_arrays`, for one caller at a time.
+    stress (E, 6) is used in the geometric part when mixed, else the current stress is. weight has
+    no rows when the
+    scene has none. strain e (E, 6) is always written. scratch : of `scratch_arrays`, for one caller
+        at a time.
     """
-    (x0, x1, R0, R1, E0, E1, y0, y1, d0, d1, T0, T1,
-     p, phi, R, A, D, KB, X, T, B,
-     H, M, H14, G, sigma) = scratch
+    (
+        x0,
+        x1,
+        R0,
+        R1,
+        E0,
+        E1,
+        y0,
+        y1,
+        d0,
+        d1,
+        T0,
+        T1,
+        p,
+        phi,
+        R,
+        A,
+        D,
+        KB,
+        X,
+        T,
+        B,
+        H,
+        M,
+        H14,
+        G,
+        sigma,
+    ) = scratch
     elastic = 0.0
     potential = 0.0
     weighted = weight.shape[0] > 0
@@ -176,8 +240,36 @@ def assemble_rods(
         n0, n1 = elements[e, 0], elements[e, 1]
         b0, b1, h0, h1 = node_body[n0], node_body[n1], node_hinge[n0], node_hinge[n1]
         Rb0, Rb1 = rotations[b0], rotations[b1]
-        node_pose(positions[b0], Rb0, h0, angles, axes, centres, plain[n0], frame[n0], offset[n0], x0, R0, E0, y0)
-        node_pose(positions[b1], Rb1, h1, angles, axes, centres, plain[n1], frame[n1], offset[n1], x1, R1, E1, y1)
+        node_pose(
+            positions[b0],
+            Rb0,
+            h0,
+            angles,
+            axes,
+            centres,
+            plain[n0],
+            frame[n0],
+            offset[n0],
+            x0,
+            R0,
+            E0,
+            y0,
+        )
+        node_pose(
+            positions[b1],
+            Rb1,
+            h1,
+            angles,
+            axes,
+            centres,
+            plain[n1],
+            frame[n1],
+            offset[n1],
+            x1,
+            R1,
+            E1,
+            y1,
+        )
         elastic += element_energy(x0, R0, x1, R1, L[e], gamma[e], K[e], p, phi, R, strain[e])
         if weighted:
             for k in range(3):
@@ -191,10 +283,18 @@ def assemble_rods(
             c, c1, _ = bend_coefficient(phi[0] ** 2 + phi[1] ** 2 + phi[2] ** 2)
             strain_displacement(R0, p, phi, c, c1, A, D, B)
         else:
-            element_hessian(R0, L[e], K[e], p, phi, stress[e] if mixed else sigma, A, D, B, KB, X, T, H)
+            element_hessian(
+                R0, L[e], K[e], p, phi, stress[e] if mixed else sigma, A, D, B, KB, X, T, H
+            )
         for k in range(12):
-            G[k] = B[0, k] * sigma[0] + B[1, k] * sigma[1] + B[2, k] * sigma[2] \
-                + B[3, k] * sigma[3] + B[4, k] * sigma[4] + B[5, k] * sigma[5]
+            G[k] = (
+                B[0, k] * sigma[0]
+                + B[1, k] * sigma[1]
+                + B[2, k] * sigma[2]
+                + B[3, k] * sigma[3]
+                + B[4, k] * sigma[4]
+                + B[5, k] * sigma[5]
+            )
         if weighted:
             for k in range(3):
                 G[k] -= 0.5 * L[e] * weight[e, k]
@@ -209,7 +309,8 @@ def assemble_rods(
         if order == GRADIENT:
             continue
 
-        transform_columns(H, 6, 0, plain0, T0, M, 0)  # of H14 the blocks on and above the diagonal are used
+        # of H14 the blocks on and above the diagonal are used
+        transform_columns(H, 6, 0, plain0, T0, M, 0)
         transform_columns(H, 12, 6, plain1, T1, M, 7)
         transform_rows(M, 0, plain0, T0, H14, 0)
         transform_rows(M, 6, plain1, T1, H14, 7)
@@ -265,13 +366,16 @@ def scatter_blocks(rows, slots, g, H, second_order, gradient, values):
             for b in range(a, k):
                 slot = slots[e, s]
                 if slot >= 0:
-                    values[slot] += H[e, a, b] if a == b or rows[e, a] != rows[e, b] else 2 * H[e, a, b]
+                    values[slot] += (
+                        H[e, a, b] if a == b or rows[e, a] != rows[e, b] else 2 * H[e, a, b]
+                    )
                 s += 1
 
 
 @kernel
 def predict_stress(strain, B14, rows, increment, K, L, stress):
-    """stress = (K/L) (e + B d), the stress that a linear step d (over the kept unknowns) leads to."""
+    """stress = (K/L) (e + B d), the stress that a linear step d (over the kept unknowns) leads
+    to."""
     for e in range(strain.shape[0]):
         for r in range(6):
             v = strain[e, r]

@@ -1,12 +1,14 @@
 """Loads: dead forces on points of bodies, moments on bodies and hinges, self-weight.
 
-A force that keeps its direction has a potential, -f.x. A moment on a body that may turn in space has none, neither one
-that keeps its direction nor one that turns with the body: the work depends on the path (Ziegler, Principles of
-Structural Stability). Their tangents are not symmetric. In increments R exp(hat(w)) the symmetric part, which the
-solver takes, is zero for both, and their skew parts are opposite; where the turns of the body stay in one plane it is
-the whole tangent. So equilibria are exact, iterations converge linearly where turns are spatial, and stability is that
-of the semi-tangential moment between the two.
+A force that keeps its direction has a potential, -f.x. A moment on a body that may turn in space
+has none, neither one that keeps its direction nor one that turns with the body: the work depends on
+the path (Ziegler, Principles of Structural Stability). Their tangents are not symmetric. In
+increments R exp(hat(w)) the symmetric part, which the solver takes, is zero for both, and their
+skew parts are opposite; where the turns of the body stay in one plane it is the whole tangent. So
+equilibria are exact, iterations converge linearly where turns are spatial, and stability is that of
+the semi-tangential moment between the two.
 """
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -45,14 +47,15 @@ class DeadForces:
     def gradient_hessian(self, state: State) -> tuple[float, np.ndarray, np.ndarray]:
         """Energy, gradients (m, 6) and Hessians (m, 6, 6).
 
-        The second variation of R o along R exp(hat(w)) is R (w x (w x o)), so with F = R^T f that of the energy is
-        (F.o) w.w - (F.w)(o.w).
+        The second variation of R o along R exp(hat(w)) is R (w x (w x o)), so with F = R^T f that
+        of the energy is (F.o) w.w - (F.w)(o.w).
         """
         o = self.points
         F = np.einsum("mji,mj->mi", state.rotations[self.bodies], self.forces)
         H = np.zeros((len(o), 6, 6))
-        H[:, 3:, 3:] = (np.einsum("mi,mi->m", F, o)[:, None, None] * np.eye(3)
-                        - 0.5 * (F[:, :, None] * o[:, None, :] + o[:, :, None] * F[:, None, :]))
+        H[:, 3:, 3:] = np.einsum("mi,mi->m", F, o)[:, None, None] * np.eye(3) - 0.5 * (
+            F[:, :, None] * o[:, None, :] + o[:, :, None] * F[:, None, :]
+        )
         return self.energy(state), -np.concatenate([self.forces, np.cross(o, F)], axis=1), H
 
 
@@ -106,7 +109,9 @@ class HingeTorques:
         try:
             self.torques = np.array(np.broadcast_to(torques, self.hinges.shape), float)
         except ValueError:
-            raise InputError(f"expected one torque or {len(self.hinges)}", field="loads.torques") from None
+            raise InputError(
+                f"expected one torque or {len(self.hinges)}", field="loads.torques"
+            ) from None
         if not np.isfinite(self.torques).all():
             raise InputError("torques must be finite", field="loads.torques")
         self.dofs = 6 * n_bodies + self.hinges[:, None]
@@ -149,21 +154,27 @@ def with_self_weight(scene: Scene, density: Any, gravity: Any, areas: Any = None
     gravity : (3,) acceleration, global axes
     areas : (E,) or one cross-section area; default: those of the rods' sections
 
-    Raises InputError when a rod has no section and no area is given, or where numbers are not positive.
+    Raises InputError when a rod has no section and no area is given, or where numbers are not
+    positive.
     """
     n = len(scene.elements)
     if areas is None:
         areas = np.full(n, np.nan)
         for number, chain in enumerate(scene.chains):
             if chain.section is None:
-                raise InputError("a rod without section needs an area", field="loads.areas", value=number)
+                raise InputError(
+                    "a rod without section needs an area", field="loads.areas", value=number
+                )
             areas[chain.elements] = chain.section.area
     try:
-        density, areas = (np.broadcast_to(np.asarray(values, float), n) for values in (density, areas))
+        density, areas = (
+            np.broadcast_to(np.asarray(values, float), n) for values in (density, areas)
+        )
         gravity = np.broadcast_to(np.asarray(gravity, float), 3)
     except ValueError:
-        raise InputError(f"expected one density and area or {n}, and gravity of three components",
-                         field="loads") from None
+        raise InputError(
+            f"expected one density and area or {n}, and gravity of three components", field="loads"
+        ) from None
     positive = all(((values > 0) & np.isfinite(values)).all() for values in (density, areas))
     if not (positive and np.isfinite(gravity).all()):
         raise InputError("density and areas must be positive, gravity finite", field="loads")

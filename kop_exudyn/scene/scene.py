@@ -1,12 +1,16 @@
-"""A scene: bodies, hinges, rods, loads and actuators, and how they depend on the design parameters q.
+"""A scene: bodies, hinges, rods, loads and actuators, and how they depend on the design parameters
+q.
 
-Bodies (hubs, corners, plates, free interior nodes) carry a pose. A rod's node sits on one body, perhaps behind one of
-its hinges: x = x_b + R_b (p + E(a) o),  R = R_b E(a) C,  with E(a) the turn by the angle a about the hinge's axis
-through its centre p; without a hinge p = 0 and E = I. So coincident joints need no constraint equations: the unknowns
-are body increments and free hinge angles.
+Bodies (hubs, corners, plates, free interior nodes) carry a pose. A rod's node sits on one body,
+perhaps behind one of its hinges: x = x_b + R_b (p + E(a) o),  R = R_b E(a) C,  with E(a) the turn
+by the angle a about the hinge's axis through its centre p; without a hinge p = 0 and E = I. So
+coincident joints need no constraint equations: the unknowns are body increments and free hinge
+angles.
 
-Unknowns are numbered 6 body + 0..5 (global translation, then body-frame rotation), then 6 n_bodies + hinge.
+Unknowns are numbered 6 body + 0..5 (global translation, then body-frame rotation), then 6 n_bodies
++ hinge.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
@@ -36,7 +40,8 @@ class Driven:
 
 @dataclass(frozen=True)
 class Chain:
-    """One rod piece as it is drawn and exported: its nodes in order, its elements (none: rigid), its cross-section."""
+    """One rod piece as it is drawn and exported: its nodes in order, its elements (none: rigid),
+    its cross-section."""
 
     nodes: np.ndarray
     elements: np.ndarray
@@ -48,11 +53,12 @@ class Scene:
     """What is simulated; made by `SceneBuilder`.
 
     initial : state to start from
-    hinge_axis (n_hinges, 3), hinge_centre (n_hinges, 3) : unit vectors and points, in axes of the hinge's body
-    node_body (N,), node_hinge (N,) (-1: none)
-    node_frame (N, 3, 3), node_offset (N, 3) : C and o, in body axes at hinge angle 0; o from the hinge's centre
-    elements (E, 2) nodes; stiffness (E, 6); rest_strain (E, 6)
-    length_constant, length_factor (E,), length_parameter (E,) (-1: none): rest length = constant + factor q[parameter]
+    hinge_axis (n_hinges, 3), hinge_centre (n_hinges, 3) : unit vectors and points, in axes of the
+    hinge's body node_body (N,), node_hinge (N,) (-1: none)
+    node_frame (N, 3, 3), node_offset (N, 3) : C and o, in body axes at hinge angle 0; o from the
+    hinge's centre elements (E, 2) nodes; stiffness (E, 6); rest_strain (E, 6) length_constant,
+    length_factor (E,), length_parameter (E,) (-1: none): rest length = constant + factor
+    q[parameter]
     weight (E, 3) : dead load per rest length, or None
     driven : unknowns prescribed by parameters
     pinned : (6 n_bodies + n_hinges,) bool, unknowns held at their initial value
@@ -110,20 +116,31 @@ class Scene:
     @cached_property
     def chain_parameters(self) -> np.ndarray:
         """(n_chains,) the parameter that each rod piece's length depends on, -1 without one."""
-        return np.array([self.length_parameter[chain.elements[0]] if len(chain.elements) else -1
-                         for chain in self.chains], int)
+        return np.array(
+            [
+                self.length_parameter[chain.elements[0]] if len(chain.elements) else -1
+                for chain in self.chains
+            ],
+            int,
+        )
 
     @cached_property
     def plain_nodes(self) -> np.ndarray:
         """(N,) bool: nodes that coincide with their body, axes included."""
-        return ((self.node_hinge < 0) & (self.node_offset == 0).all(1)
-                & (self.node_frame == np.eye(3)).all((1, 2)))
+        return (
+            (self.node_hinge < 0)
+            & (self.node_offset == 0).all(1)
+            & (self.node_frame == np.eye(3)).all((1, 2))
+        )
 
     @cached_property
     def length_scale(self) -> float:
-        """A length typical of the elements, from the initial geometry; makes tolerances independent of units."""
+        """A length typical of the elements, from the initial geometry; makes tolerances independent
+        of units."""
         x = self.node_poses(self.initial)[0]
-        return float(np.median(np.linalg.norm(x[self.elements[:, 1]] - x[self.elements[:, 0]], axis=1)))
+        return float(
+            np.median(np.linalg.norm(x[self.elements[:, 1]] - x[self.elements[:, 0]], axis=1))
+        )
 
     @cached_property
     def size(self) -> float:
@@ -131,13 +148,16 @@ class Scene:
         return float(np.linalg.norm(np.ptp(self.node_poses(self.initial)[0], axis=0)))
 
     def rest_lengths(self, q: np.ndarray) -> np.ndarray:
-        """Rest lengths (E,) at q (n_parameters,). Raises SimulationFailure unless all are positive."""
+        """Rest lengths (E,) at q (n_parameters,). Raises SimulationFailure unless all are
+        positive."""
         lengths = self.length_constant.copy()
         has = self.length_parameter >= 0
         lengths[has] += self.length_factor[has] * q[self.length_parameter[has]]
         if not (lengths > 0).all():
             worst = int(np.argmin(np.where(np.isnan(lengths), -np.inf, lengths)))
-            raise SimulationFailure(f"rest length of element {worst} is {lengths[worst]:.6g}, not positive")
+            raise SimulationFailure(
+                f"rest length of element {worst} is {lengths[worst]:.6g}, not positive"
+            )
         return lengths
 
     def driven_values(self, q: np.ndarray) -> np.ndarray:
@@ -163,11 +183,14 @@ class Scene:
         return exp_so3(angles[:, None] * self.hinge_axis)
 
     def node_arms(self, state: State) -> tuple[np.ndarray, np.ndarray]:
-        """From every node's body to the node, y (N, 3), and dy/da (N, 3) in its hinge's angle; in body axes."""
+        """From every node's body to the node, y (N, 3), and dy/da (N, 3) in its hinge's angle; in
+        body axes."""
         arms, rates = self.node_offset.copy(), np.zeros_like(self.node_offset)
         behind = np.flatnonzero(self.node_hinge >= 0)
         hinge = self.node_hinge[behind]
-        turned = np.einsum("nij,nj->ni", self.hinge_turns(state.angles)[hinge], self.node_offset[behind])
+        turned = np.einsum(
+            "nij,nj->ni", self.hinge_turns(state.angles)[hinge], self.node_offset[behind]
+        )
         arms[behind] = self.hinge_centre[hinge] + turned
         rates[behind] = np.cross(self.hinge_axis[hinge], turned)
         return arms, rates
@@ -177,7 +200,9 @@ class Scene:
         Rb, frames = state.rotations[self.node_body], self.node_frame.copy()
         behind = np.flatnonzero(self.node_hinge >= 0)
         frames[behind] = self.hinge_turns(state.angles)[self.node_hinge[behind]] @ frames[behind]
-        return state.positions[self.node_body] + np.einsum("nij,nj->ni", Rb, self.node_arms(state)[0]), Rb @ frames
+        return state.positions[self.node_body] + np.einsum(
+            "nij,nj->ni", Rb, self.node_arms(state)[0]
+        ), Rb @ frames
 
     def polylines(self, state: State) -> list[np.ndarray]:
         """Node positions (k, 3) along every rod piece."""

@@ -1,9 +1,11 @@
 """Where every element's Hessian entries go in the assembled matrix: found once a topology.
 
-Kept unknowns are ordered free first, then driven. The upper triangle of the symmetric matrix over the kept unknowns is
-stored by columns, so its first n_free columns are exactly the factorisation's input, and the columns of the driven
-unknowns hold d(gradient)/d(driven), which the sensitivities need.
+Kept unknowns are ordered free first, then driven. The upper triangle of the symmetric matrix over
+the kept unknowns is stored by columns, so its first n_free columns are exactly the factorisation's
+input, and the columns of the driven unknowns hold d(gradient)/d(driven), which the sensitivities
+need.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -22,7 +24,8 @@ class Sparsity:
     n_free, n_driven : numbers of kept unknowns
     kept : (n_dofs,) place of each unknown among the kept ones, -1 when pinned
     free : (n_free,) the free unknowns, numbered as in the scene
-    rows : (E, 14) kept place of each element's unknowns (two nodes x body 6 and hinge), -1 when absent or pinned
+    rows : (E, 14) kept place of each element's unknowns (two nodes x body 6 and hinge), -1 when
+        absent or pinned
     slots : (E, 105) place of each upper element entry in the values, -1 when dropped
     term_rows, term_slots : the same for every term's blocks (m, k) and (m, k (k + 1) / 2)
     indptr, indices : compressed columns of the upper triangle over all kept unknowns
@@ -58,16 +61,19 @@ class Sparsity:
     @cached_property
     def driven_column(self) -> np.ndarray:
         """Driven unknown of each entry in the driven columns, `values[n_factor_values:]`."""
-        return np.repeat(np.arange(self.n_driven), np.diff(self.indptr[self.n_free:]))
+        return np.repeat(np.arange(self.n_driven), np.diff(self.indptr[self.n_free :]))
 
     def driven_columns(self, values: np.ndarray) -> tuple[sp.csc_matrix, sp.csc_matrix]:
-        """Hessian blocks free x driven (n_free, n_driven) and upper driven x driven (n_driven, n_driven).
+        """Hessian blocks free x driven (n_free, n_driven) and upper driven x driven (n_driven,
+        n_driven).
 
         values : those of the driven columns, `values[n_factor_values:]`
         """
         n, m = self.n_free, self.n_driven
         start = self.n_factor_values
-        block = sp.csc_matrix((values, self.indices[start:], self.indptr[n:] - start), shape=(n + m, m))
+        block = sp.csc_matrix(
+            (values, self.indices[start:], self.indptr[n:] - start), shape=(n + m, m)
+        )
         return block[:n], block[n:]
 
 
@@ -86,16 +92,28 @@ def sparsity_of(scene: Scene) -> Sparsity:
     n_kept = len(free) + len(scene.driven.dofs)
     pairs = [_pair_keys(r, n_kept) for r in (rows, *term_rows)]
     diagonal = np.arange(len(free), dtype=np.int64) * (n_kept + 1)
-    keys, where = np.unique(np.concatenate([p.ravel() for p in pairs] + [diagonal, [-1]]), return_inverse=True)
+    keys, where = np.unique(
+        np.concatenate([p.ravel() for p in pairs] + [diagonal, [-1]]), return_inverse=True
+    )
     where = where - 1  # the key -1 (dropped entries) comes first
     cuts = np.cumsum([p.size for p in pairs])
-    slots = [part.reshape(p.shape).astype(np.int32) for part, p in zip(np.split(where, cuts), pairs)]
+    slots = [
+        part.reshape(p.shape).astype(np.int32) for part, p in zip(np.split(where, cuts), pairs)
+    ]
     keys = keys[1:]
     indptr = np.searchsorted(keys, np.arange(n_kept + 1, dtype=np.int64) * n_kept).astype(np.int32)
     return Sparsity(
-        n_free=len(free), n_driven=n_kept - len(free), kept=kept[:-1], free=free, rows=rows.astype(np.int32),
-        slots=slots[0], term_rows=tuple(r.astype(np.int32) for r in term_rows), term_slots=tuple(slots[1:]),
-        indptr=indptr, indices=(keys % n_kept).astype(np.int32), diagonal=where[cuts[-1]:-1],
+        n_free=len(free),
+        n_driven=n_kept - len(free),
+        kept=kept[:-1],
+        free=free,
+        rows=rows.astype(np.int32),
+        slots=slots[0],
+        term_rows=tuple(r.astype(np.int32) for r in term_rows),
+        term_slots=tuple(slots[1:]),
+        indptr=indptr,
+        indices=(keys % n_kept).astype(np.int32),
+        diagonal=where[cuts[-1] : -1],
     )
 
 
@@ -107,7 +125,8 @@ def element_dofs(scene: Scene) -> np.ndarray:
 
 
 def _pair_keys(rows: np.ndarray, n: int) -> np.ndarray:
-    """column n + row of every upper entry (a <= b) of each block; -1 where one of them is not kept."""
+    """column n + row of every upper entry (a <= b) of each block; -1 where one of them is not
+    kept."""
     a, b = np.triu_indices(rows.shape[1])
     first, second = rows[:, a].astype(np.int64), rows[:, b].astype(np.int64)
     key = np.maximum(first, second) * n + np.minimum(first, second)

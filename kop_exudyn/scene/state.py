@@ -1,4 +1,5 @@
 """The state of a scene: poses of all bodies and angles of all hinges."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -22,12 +23,13 @@ class State:
     angles: np.ndarray
 
     def moved(self, increment: np.ndarray) -> State:
-        """The state after an increment (6 n_bodies + n_hinges,): (dx, w) a body, then hinge angles."""
+        """The state after an increment (6 n_bodies + n_hinges,): (dx, w) a body, then hinge
+        angles."""
         n = len(self.positions)
         pose = increment[: 6 * n].reshape(n, 6)
         rotations = np.empty_like(self.rotations)
         compose_increments(self.rotations, np.ascontiguousarray(pose[:, 3:]), rotations)
-        return State(self.positions + pose[:, :3], rotations, self.angles + increment[6 * n:])
+        return State(self.positions + pose[:, :3], rotations, self.angles + increment[6 * n :])
 
     def increment_to(self, other: State) -> np.ndarray:
         """The increment (6 n_bodies + n_hinges,) that moves this state to the other one."""
@@ -37,7 +39,9 @@ class State:
 
     def transformed(self, rotation: np.ndarray, translation: np.ndarray) -> State:
         """The state after a rigid motion x -> rotation x + translation."""
-        return State(self.positions @ rotation.T + translation, rotation @ self.rotations, self.angles)
+        return State(
+            self.positions @ rotation.T + translation, rotation @ self.rotations, self.angles
+        )
 
     def to_arrays(self) -> dict[str, np.ndarray]:
         """Plain arrays, for saving."""

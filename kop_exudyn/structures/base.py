@@ -1,41 +1,30 @@
-"""What every structure class offers to the kit and the optimiser: elements, states to solve, a target to fit.
+"""What every structure class offers to the kit and the optimiser: elements, states to solve, a
+target to fit.
 
-A structure class is one module in this folder that registers a `Design` subclass; nothing else has to change.
+A structure class is one module in this folder that registers a `Design` subclass; nothing else has
+to change.
 """
+
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Callable, ClassVar, Iterator, Mapping, TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
 from ..errors import InputError
+from ..kit.groups import ElementGroup
 from ..plugins import load_folder
-from .load_case import LoadCase, load_case_from_dict
+from .loads import LoadCase, load_case_from_dict
 
 if TYPE_CHECKING:
     from ..equilibrium.newton import Equilibrium
     from ..equilibrium.system import System
     from ..scene.scene import Scene
     from ..scene.state import State
-
-
-@dataclass(frozen=True)
-class ElementGroup:
-    """Elements of one kind and one number of parameters.
-
-    kind : name of the part kind that serves them ("linear", "angular", "cell", ...)
-    indices : (n, k) int, where the k parameters of each element stand in the design's parameters q
-    """
-
-    kind: str
-    indices: np.ndarray
-
-    def shifted(self, offset: int) -> ElementGroup:
-        """The same elements in a longer parameter vector (several designs after each other)."""
-        return ElementGroup(self.kind, self.indices + offset)
 
 
 @dataclass(frozen=True)
@@ -81,8 +70,9 @@ class Design(ABC):
     """
 
     class_name: ClassVar[str]
-    # Weight of the fit in the objective, against 0.02 for the energy, that suits the class: stiff structures whose
-    # shape hardly depends on their parts need more of it, those with many soft modes less.
+    # Weight of the fit in the objective, against 0.02 for the energy, that suits the class: stiff
+    # structures whose shape hardly depends on their parts need more of it, those with many soft
+    # modes less.
     fit_weight: ClassVar[float] = 1e4
     # Typical change of parameters that belong to no element.
     free_scale: float = 1.0
@@ -102,7 +92,8 @@ class Design(ABC):
 
     @abstractmethod
     def deploy(self, q: np.ndarray | None = None) -> dict[str, Equilibrium]:
-        """Equilibria of all roles from the design's own starting geometry (no warm start), at q (default: the input).
+        """Equilibria of all roles from the design's own starting geometry (no warm start), at q
+        (default: the input).
 
         Their `iterations` and `wall_s` count all solves that led to them (see `Equilibrium.after`).
         Raises SimulationFailure when one of them can't be reached.
@@ -111,7 +102,8 @@ class Design(ABC):
     @cached_property
     @abstractmethod
     def target(self) -> Target:
-        """The target; may need simulations of the input design, so it is computed at first use and kept."""
+        """The target; may need simulations of the input design, so it is computed at first use and
+        kept."""
 
     def report_positions(self, state: State) -> np.ndarray:
         """Joint positions (n, 3) in the order and the units of the design's own file."""
@@ -129,12 +121,14 @@ class Design(ABC):
         return {role.name: System(self.scene(role.name)) for role in self.roles}
 
     def __getstate__(self) -> dict[str, Any]:
-        """What travels to another process: everything but the solver workspaces, which are made anew there."""
+        """What travels to another process: everything but the solver workspaces, which are made
+        anew there."""
         return {key: value for key, value in self.__dict__.items() if key != "systems"}
 
     @property
     def free(self) -> np.ndarray:
-        """(k,) parameters that belong to no element, such as places of supports: no part has to realise them."""
+        """(k,) parameters that belong to no element, such as places of supports: no part has to
+        realise them."""
         used = [group.indices.ravel() for group in self.groups]
         return np.setdiff1d(np.arange(len(self.parameters)), np.concatenate(used) if used else used)
 
@@ -149,7 +143,8 @@ _REGISTRY: dict[str, Reader] = {}
 
 
 def register(class_name: str) -> Callable[[R], R]:
-    """Decorator: the reader that makes a `Design` of a design file's content (a mapping) and its source name."""
+    """Decorator: the reader that makes a `Design` of a design file's content (a mapping) and its
+    source name."""
 
     def add(reader: R) -> R:
         _REGISTRY[class_name] = reader
@@ -174,7 +169,12 @@ def design_from_dict(data: Mapping[str, Any], source: str = "design") -> Design:
         load_folder(__package__)
     if class_name not in _REGISTRY:
         known = ", ".join(sorted(_REGISTRY))
-        raise InputError(f"unknown structure class (known: {known})", source=source, field="class", value=class_name)
+        raise InputError(
+            f"unknown structure class (known: {known})",
+            source=source,
+            field="class",
+            value=class_name,
+        )
     design = _REGISTRY[class_name](data, source)
     if "loads" in data or "supports" in data:
         design.loads = load_case_from_dict(data)

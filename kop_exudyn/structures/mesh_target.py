@@ -1,4 +1,5 @@
 """A target surface from a mesh file, for designs that don't lie on it to begin with."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -7,29 +8,32 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
-from ..scene.surface import TriangleSurface
+from ..geometry.mesh_files import read_mesh
+from ..geometry.triangles import TriangleSurface
 from .base import Target
-from .mesh_files import read_mesh
 
 _MAX_ITERATIONS = 200
 _SETTLED = 1e-6  # of the joints' size, by which an iteration moves them
 
 
 def load_target_mesh(path: Path) -> TriangleSurface:
-    """The mesh of a file. Raises InputError, naming the field "target.file", where it contains no usable one."""
+    """The mesh of a file. Raises InputError, naming the field "target.file", where it contains no
+    usable one."""
     vertices, faces = read_mesh(path, "target.file")
     try:
         return TriangleSurface(vertices, faces)
     except InputError as error:
-        raise InputError(f"{error.message} ({error.field})", field="target.file", value=path.name) from None
+        raise InputError(
+            f"{error.message} ({error.field})", field="target.file", value=path.name
+        ) from None
 
 
 def target_on_mesh(surface: TriangleSurface, joints: np.ndarray) -> Target:
     """A mesh as target, and for each joint (n, 3) a place on it.
 
-    The joints are laid onto the mesh from where they are, by turns of closest points and best rigid motions (Besl and
-    McKay, IEEE PAMI 14, 1992). So the mesh has to lie and face about as the joints do; the target fitting of every
-    later state looks for the best placement by itself.
+    The joints are laid onto the mesh from where they are, by turns of closest points and best rigid
+    motions (Besl and McKay, IEEE PAMI 14, 1992). So the mesh has to lie and face about as the
+    joints do; the target fitting of every later state looks for the best placement by itself.
     """
     size, laid = float(np.linalg.norm(np.ptp(joints, axis=0))), joints
     for _ in range(_MAX_ITERATIONS):
@@ -39,4 +43,6 @@ def target_on_mesh(surface: TriangleSurface, joints: np.ndarray) -> Target:
         if np.abs(laid - before).max() <= _SETTLED * size:
             break
     positions = surface.closest(laid).points
-    return Target(surface.vertices, surface.faces, positions, float(np.linalg.norm(np.ptp(positions, axis=0))))
+    return Target(
+        surface.vertices, surface.faces, positions, float(np.linalg.norm(np.ptp(positions, axis=0)))
+    )

@@ -1,18 +1,21 @@
-"""Parameters and elements of straightened curves: the lengths of straight pieces and the angles of their corners.
+"""Parameters and elements of straightened curves: the lengths of straight pieces and the angles of
+their corners.
 
-They are numbered curve by curve: for each span the lengths from joint to corner and from corner to joint, then the
-free ends, then the corner angles. A straight piece runs from corner to corner through its joint, so a linear element is
-the two lengths before and after a joint, in the direction of the curve; at an end without free end the one there is.
+They are numbered curve by curve: for each span the lengths from joint to corner and from corner to
+joint, then the free ends, then the corner angles. A straight piece runs from corner to corner
+through its joint, so a linear element is the two lengths before and after a joint, in the direction
+of the curve; at an end without free end the one there is.
 """
+
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Sequence
 
 import numpy as np
 
-from .base import ElementGroup
-from .network import Strand
+from ..geometry.network import Strand
+from ..kit.groups import ElementGroup
 
 _SHORTEST = 0.1  # of the median length: shorter pieces are no sensible parts
 
@@ -22,7 +25,8 @@ class StrandNumbers:
     """Where the parameters of one strand stand in the design's vector q.
 
     before, after (n_spans,) : lengths from joint to corner, and from corner to joint
-    tips : lengths of the free ends before the first and after the last joint, None where there is none
+    tips : lengths of the free ends before the first and after the last joint, None where there is
+        none
     corners (n_spans,) : corner angles
     """
 
@@ -35,13 +39,17 @@ class StrandNumbers:
         """The one or two lengths around each joint; a loop's first joint comes last."""
         if closed:
             return np.stack([self.after, np.roll(self.before, -1)], axis=1).tolist()
-        arriving, leaving = [self.tips[0], *self.after.tolist()], [*self.before.tolist(), self.tips[1]]
+        arriving, leaving = (
+            [self.tips[0], *self.after.tolist()],
+            [*self.before.tolist(), self.tips[1]],
+        )
         return [[n for n in pair if n is not None] for pair in zip(arriving, leaving)]
 
 
 @dataclass(frozen=True)
 class Numbering:
-    """parameters (nq,) q; is_length (nq,) bool, else a corner's angle; groups: the elements; strands: one a curve."""
+    """parameters (nq,) q; is_length (nq,) bool, else a corner's angle; groups: the elements;
+    strands: one a curve."""
 
     parameters: np.ndarray
     is_length: np.ndarray
@@ -49,15 +57,20 @@ class Numbering:
     strands: tuple[StrandNumbers, ...]
 
     def bounds(self, largest_corner: float) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper bounds (nq,), for corners up to an angle (rad); no shorter length than there is already."""
+        """Lower and upper bounds (nq,), for corners up to an angle (rad); no shorter length than
+        there is already."""
         shortest = _SHORTEST * float(np.median(self.parameters[self.is_length]))
-        return (np.where(self.is_length, np.minimum(shortest, self.parameters), -largest_corner),
-                np.where(self.is_length, np.inf, largest_corner))
+        return (
+            np.where(self.is_length, np.minimum(shortest, self.parameters), -largest_corner),
+            np.where(self.is_length, np.inf, largest_corner),
+        )
 
 
-def number_pieces(strands: Sequence[Strand], lengths: Sequence[np.ndarray],
-                  corners: Sequence[np.ndarray]) -> Numbering:
-    """Number the lengths (n_spans, 2) and corner angles (n_spans,) of straightened strands, and their free ends."""
+def number_pieces(
+    strands: Sequence[Strand], lengths: Sequence[np.ndarray], corners: Sequence[np.ndarray]
+) -> Numbering:
+    """Number the lengths (n_spans, 2) and corner angles (n_spans,) of straightened strands, and
+    their free ends."""
     values: list[np.ndarray] = []
     is_length: list[np.ndarray] = []
     numbers: list[StrandNumbers] = []
@@ -68,17 +81,25 @@ def number_pieces(strands: Sequence[Strand], lengths: Sequence[np.ndarray],
         at_tips = first + halves.size
         at_corners = at_tips + len(tips)
         is_length += [np.ones(at_corners - first, bool), np.zeros(len(angles), bool)]
-        numbers.append(StrandNumbers(
-            np.arange(first, at_tips, 2), np.arange(first + 1, at_tips, 2),
-            (at_tips if strand.head else None, at_corners - 1 if strand.tail else None),
-            np.arange(at_corners, at_corners + len(angles))))
+        numbers.append(
+            StrandNumbers(
+                np.arange(first, at_tips, 2),
+                np.arange(first + 1, at_tips, 2),
+                (at_tips if strand.head else None, at_corners - 1 if strand.tail else None),
+                np.arange(at_corners, at_corners + len(angles)),
+            )
+        )
         first = at_corners + len(angles)
-    return Numbering(np.concatenate(values), np.concatenate(is_length), _groups(strands, numbers), tuple(numbers))
+    return Numbering(
+        np.concatenate(values), np.concatenate(is_length), _groups(strands, numbers), tuple(numbers)
+    )
 
 
 def _groups(strands: Sequence[Strand], numbers: Sequence[StrandNumbers]) -> list[ElementGroup]:
     """Whole pieces, pieces of one length, corners: those groups that aren't empty."""
-    pieces = [piece for strand, own in zip(strands, numbers) for piece in own.around_joints(strand.closed)]
+    pieces = [
+        piece for strand, own in zip(strands, numbers) for piece in own.around_joints(strand.closed)
+    ]
     by_size = {size: [piece for piece in pieces if len(piece) == size] for size in (2, 1)}
     groups = [ElementGroup("linear", np.array(rows)) for rows in by_size.values() if rows]
     corners = np.concatenate([own.corners for own in numbers])

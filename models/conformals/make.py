@@ -1,13 +1,15 @@
-"""Writes the ten designs of this folder: one square grid under ten conformal maps, with the same mean span.
+"""Writes the ten designs of this folder: one square grid under ten conformal maps, with the same
+mean span.
 
-A conformal map keeps the grid's right angles, so each image is a net that can open like a scissor grid, with spans and
-curvatures of its own. Run it from anywhere: python models/conformals/make.py
+A conformal map keeps the grid's right angles, so each image is a net that can open like a scissor
+grid, with spans and curvatures of its own. Run it from anywhere: python models/conformals/make.py
 """
+
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
-from typing import Callable
 
 import numpy as np
 
@@ -17,8 +19,9 @@ SPAN = 0.2  # mean distance of neighbouring joints, m
 DIGITS = 9
 
 Map = Callable[[np.ndarray], np.ndarray]
-# Each map on the square [-1, 1]^2, where none of them has a singular or critical point; and the change of the mean joint
-# angle, rad: well past the bifurcation out of the plane, well before the next one.
+# Each map on the square [-1, 1]^2, where none of them has a singular or critical point; and the
+# change of the mean joint angle, rad: well past the bifurcation out of the plane, well before the
+# next one.
 MAPS: dict[str, tuple[Map, float]] = {
     "sinh": (lambda z: np.sinh(0.64 * z), 0.75),
     "tanh": (lambda z: np.tanh(0.56 * z), 0.80),
@@ -41,19 +44,31 @@ def design(name: str, image: Map, opening: float) -> dict:
     at_joints = np.array([line[::POINTS_PER_SPAN] for line in lines])
     scale = SPAN / np.abs(np.diff(at_joints, axis=1)).mean()
     centre = at_joints[:JOINTS].mean()
-    curves = [{"type": "spline", "points": rounded(scale * (line - centre)), "closed": False} for line in lines]
+    curves = [
+        {"type": "spline", "points": rounded(scale * (line - centre)), "closed": False}
+        for line in lines
+    ]
     return {
-        "format": "kop_exudyn/design", "version": 1, "class": "c_shell", "name": name,
+        "format": "kop_exudyn/design",
+        "version": 1,
+        "class": "c_shell",
+        "name": name,
         "material": {"young": 2.1e9, "poisson": 0.35, "density": 900.0, "elastic_limit": 4.0e7},
         "section": {"type": "rectangle", "width": 0.03, "height": 0.004},
-        "curves": curves, "crossings": "find", "free_ends": False, "rod_offset": 0.0,
-        "opening": {"angle": opening, "side": "up"}, "elements_per_piece": 2,
+        "curves": curves,
+        "crossings": "find",
+        "free_ends": False,
+        "rod_offset": 0.0,
+        "opening": {"angle": opening, "side": "up"},
+        "elements_per_piece": 2,
     }
 
 
 def rounded(points: np.ndarray) -> list[list[float]]:
     """Complex points as pairs of short decimals, without negative zeros."""
-    return [[round(float(z.real), DIGITS) + 0.0, round(float(z.imag), DIGITS) + 0.0] for z in points]
+    return [
+        [round(float(z.real), DIGITS) + 0.0, round(float(z.imag), DIGITS) + 0.0] for z in points
+    ]
 
 
 def write(folder: Path) -> list[Path]:

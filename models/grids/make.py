@@ -2,12 +2,14 @@
 
     python models/grids/make.py
 
-Grids keep to their surface without supports when their lamellas' normal curvature varies or changes sign. Straight
-lamellas (asymptotic lines) and equally curved ones (on a sphere) would let the hinges turn freely. And lamellas that
-the surface twists (geodesic torsion) untwist, which drew grids up to 1.3 % off their surfaces. So all networks run
-along curvature lines or near them: lines of u and v are such on the minimal surfaces and on the dome; on the vault, the
-sum of a wave in x and one in y, nearly so; on the saddle the lines are traced.
+Grids keep to their surface without supports when their lamellas' normal curvature varies or changes
+sign. Straight lamellas (asymptotic lines) and equally curved ones (on a sphere) would let the
+hinges turn freely. And lamellas that the surface twists (geodesic torsion) untwist, which drew
+grids up to 1.3 % off their surfaces. So all networks run along curvature lines or near them: lines
+of u and v are such on the minimal surfaces and on the dome; on the vault, the sum of a wave in x
+and one in y, nearly so; on the saddle the lines are traced.
 """
+
 from __future__ import annotations
 
 import json
@@ -30,8 +32,12 @@ def isolines(u: list[float], v: list[float]) -> dict:
 
 def curvature_lines(half: float, reach: float) -> dict:
     """Lines through points up to `half` from the middle on both axes, traced as far as `reach`."""
-    return {"type": "curvature", "domain": [[-reach, -reach], [reach, reach]],
-            "points": [[u, 0.0] for u in lines(half)], "second_points": [[0.0, v] for v in lines(half)]}
+    return {
+        "type": "curvature",
+        "domain": [[-reach, -reach], [reach, reach]],
+        "points": [[u, 0.0] for u in lines(half)],
+        "second_points": [[0.0, v] for v in lines(half)],
+    }
 
 
 def analytic(name: str, **coefficients) -> dict:
@@ -41,21 +47,32 @@ def analytic(name: str, **coefficients) -> dict:
 WAVES = [[0.45, -0.4, 0.0, 0.6], [-0.25, 0.6, 0.05, 0.5]]  # height, centre, width
 SKEW_SADDLE = [[0, 0, -0.5], [0, 0.15], [0.35], [0.2]]
 GRIDS = {
-    "dome": (analytic("paraboloid", a=-0.7, b=-0.4), isolines(lines(0.8, 9, 0.3), lines(0.8, 9, -0.2))),
+    "dome": (
+        analytic("paraboloid", a=-0.7, b=-0.4),
+        isolines(lines(0.8, 9, 0.3), lines(0.8, 9, -0.2)),
+    ),
     "saddle": (analytic("polynomial", coefficients=SKEW_SADDLE), curvature_lines(0.75, 1.15)),
     "enneper": (analytic("enneper", scale=1.4), isolines(lines(0.48), lines(0.48))),
     "catenoid": (analytic("catenoid", scale=1.0), isolines(lines(0.85, 9), lines(0.75, 8))),
     "free_form": (analytic("gaussians", bumps=WAVES), isolines(lines(0.8, 9), lines(0.8, 9))),
-    "mesh": ({"type": "mesh", "file": "vault.obj", "chart": "conformal"}, isolines(lines(0.78, 9), lines(0.72))),
+    "mesh": (
+        {"type": "mesh", "file": "vault.obj", "chart": "conformal"},
+        isolines(lines(0.78, 9), lines(0.72)),
+    ),
 }
 
 
 def design(name: str, surface: dict, network: dict) -> dict:
     return {
-        "format": "kop_exudyn/design", "version": 1, "class": "grid", "name": name,
+        "format": "kop_exudyn/design",
+        "version": 1,
+        "class": "grid",
+        "name": name,
         "material": {"young": 2.1e9, "poisson": 0.35, "density": 900.0, "elastic_limit": 4.0e7},
         "section": {"type": "rectangle", "width": 0.004, "height": 0.03},
-        "surface": surface, "network": network, "elements_per_piece": 2,
+        "surface": surface,
+        "network": network,
+        "elements_per_piece": 2,
     }
 
 
@@ -68,8 +85,12 @@ def vault(path: Path, rings: int = 20) -> None:
     """An asymmetric vault on a hexagonal outline: concentric rings of triangles."""
     points, triangles = [(0.0, 0.0)], []
     for ring in range(1, rings + 1):
-        corners = [ring * np.array([np.cos(k * np.pi / 3), np.sin(k * np.pi / 3)]) for k in range(7)]
-        points += [tuple(a + (b - a) * s / ring) for a, b in zip(corners, corners[1:]) for s in range(ring)]
+        corners = [
+            ring * np.array([np.cos(k * np.pi / 3), np.sin(k * np.pi / 3)]) for k in range(7)
+        ]
+        points += [
+            tuple(a + (b - a) * s / ring) for a, b in zip(corners, corners[1:]) for s in range(ring)
+        ]
     x, y = 1.35 * np.array(points).T / rings
     for ring in range(1, rings + 1):
         for side in range(6):
@@ -91,4 +112,6 @@ if __name__ == "__main__":
     folder = Path(__file__).parent
     vault(folder / "vault.obj")
     for number, (name, (surface, network)) in enumerate(GRIDS.items(), start=1):
-        (folder / f"{number:02d}_{name}.json").write_text(json.dumps(design(name, surface, network), indent=1) + "\n")
+        (folder / f"{number:02d}_{name}.json").write_text(
+            json.dumps(design(name, surface, network), indent=1) + "\n"
+        )

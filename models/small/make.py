@@ -1,7 +1,9 @@
-"""Writes the designs of this folder: the middles of our C-shells, few joints each, for examples and quick runs.
+"""Writes the designs of this folder: the middles of our C-shells, few joints each, for examples and
+quick runs.
 
 Run it from anywhere: python models/small/make.py
 """
+
 from __future__ import annotations
 
 import json
@@ -17,17 +19,25 @@ def middle(content: dict, joints: int) -> dict:
     side = len(content["curves"]) // 2
     first = (side - joints) // 2
     keep = [start + first + k for start in (0, side) for k in range(joints)]
-    return content | {"name": f"small {content['name']}", "curves": [content["curves"][k] for k in keep]}
+    return content | {
+        "name": f"small {content['name']}",
+        "curves": [content["curves"][k] for k in keep],
+    }
 
 
 def write(folder: Path) -> list[Path]:
     """Write all designs; returns their files."""
     files = []
     for name in NAMES:
-        content = middle(json.loads((MODELS / "conformals" / f"{name}.json").read_text(encoding="utf-8")), JOINTS)
+        content = middle(
+            json.loads((MODELS / "conformals" / f"{name}.json").read_text(encoding="utf-8")), JOINTS
+        )
         curves = ",\n  ".join(json.dumps(curve) for curve in content.pop("curves"))
         path = folder / f"{name}.json"
-        path.write_text(f'{json.dumps(content, indent=1)[:-2]},\n "curves": [\n  {curves}\n ]\n}}\n', encoding="utf-8")
+        path.write_text(
+            f'{json.dumps(content, indent=1)[:-2]},\n "curves": [\n  {curves}\n ]\n}}\n',
+            encoding="utf-8",
+        )
         files.append(path)
     return files
 

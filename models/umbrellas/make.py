@@ -1,19 +1,27 @@
-"""Writes the designs of this folder: umbrella meshes over synclastic, anticlastic and mixed surfaces (lengths in mm).
+"""Writes the designs of this folder: umbrella meshes over synclastic, anticlastic and mixed
+surfaces (lengths in mm).
 
     python models/umbrellas/make.py [NAME ...]
 """
+
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Callable
+from typing import Any
 
 import numpy as np
 
-from kop_exudyn.io.json_files import write_json
-from kop_exudyn.structures.umbrella_generator import (
-    design_on_surface, height_field, hexagon_patch, parallelogram_patch, triangle_patch)
-from kop_exudyn.structures.umbrella_layout import BaseMesh, Plates
+from kop_exudyn.files.json_files import write_json
+from kop_exudyn.structures.umbrella.generator import (
+    design_on_surface,
+    height_field,
+    hexagon_patch,
+    parallelogram_patch,
+    triangle_patch,
+)
+from kop_exudyn.structures.umbrella.layout import BaseMesh, Plates
 
 PLATES = Plates()
 EDGE = 30 + np.sqrt(3) * PLATES.thickness  # plates of 30 mm

@@ -1,4 +1,5 @@
 """Designs that come back when their elements do, and one that has buckled."""
+
 from __future__ import annotations
 
 from pathlib import Path
@@ -8,16 +9,17 @@ import pytest
 from kop_exudyn.analysis.buckling import buckled, missed_on_return, snapped
 from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.io.designs import load_design
-from kop_exudyn.optimize.dataset import Dataset
-from kop_exudyn.optimize.objective import DesignObjective, Weights
-from kop_exudyn.optimize.pool import DesignPool
-from kop_exudyn.optimize.stages import Stages
+from kop_exudyn.search.dataset import Dataset
+from kop_exudyn.search.objective import DesignObjective, Weights
+from kop_exudyn.search.pool import DesignPool
+from kop_exudyn.search.stages import Stages
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 
 
 def directly_built(file: str):
-    """A design, its reference, and what it is like when one linear and one angular part serve all its elements."""
+    """A design, its reference, and what it is like when one linear and one angular part serve all
+    its elements."""
     design = load_design(MODELS / file)
     with DesignPool([design]) as pool:
         pool.prepare()
@@ -31,7 +33,9 @@ def test_a_design_that_is_only_deformed_comes_back():
     objective = DesignObjective(design, reference=reference)
     origin = objective.judge(design.parameters, dict(reference.equilibria))
     assert built.fit.max_percent > 5  # far off, but elastically
-    assert missed_on_return(objective, built, origin, 4) < 1e-9 and not snapped(objective, built, origin)
+    assert missed_on_return(objective, built, origin, 4) < 1e-9 and not snapped(
+        objective, built, origin
+    )
     assert not buckled(design, built, reference)
 
 

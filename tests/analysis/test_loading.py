@@ -1,4 +1,6 @@
-"""Designs under loads: statics that must hold whatever the design, supports, and what the command line says."""
+"""Designs under loads: statics that must hold whatever the design, supports, and what the command
+line says."""
+
 from __future__ import annotations
 
 import json
@@ -9,12 +11,12 @@ import pytest
 
 from kop_exudyn.analysis.loading import loaded_state, supports_of
 from kop_exudyn.analysis.simulation import simulate
-from kop_exudyn.analysis.strength import materials_of
 from kop_exudyn.cli import main
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.structures.base import design_from_dict
-from kop_exudyn.structures.load_case import LoadCase
+from kop_exudyn.structures.loads import LoadCase
+from kop_exudyn.structures.strength import materials_of
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 
@@ -35,7 +37,9 @@ def test_weight_is_that_of_the_rods(dome, opened):
     assert found.total_force == pytest.approx(900 * 0.004 * 0.03 * length * GRAVITY)
     assert 0 < found.deflections.mean() < found.deflections.max() < 0.01 * found.diagonal
     held = found.equilibrium.state.positions[dome.joints[found.supports]]
-    np.testing.assert_allclose(held, opened.state.positions[dome.joints[found.supports]], atol=1e-10)
+    np.testing.assert_allclose(
+        held, opened.state.positions[dome.joints[found.supports]], atol=1e-10
+    )
     assert found.confirmation.moved < 1e-8 and found.equilibrium.stable
 
 
@@ -50,10 +54,19 @@ def test_the_dome_stands_on_its_lowest_boundary(dome, opened):
 
 def test_forces_and_displacements_are_reciprocal(dome, opened):
     """Maxwell and Betti: what a small force at i does at j is what the same at j does at i."""
+
     def moved(at: int, along: int, seen: int, across: int) -> float:
-        cases = [LoadCase(joints=np.array([at]), forces=size * np.eye(3)[[along]], supports=np.array([0, 8, 72, 80]))
-                 for size in (0.01, -0.01)]
-        there, back = (loaded_state(dome, opened, case).equilibrium.state.positions for case in cases)
+        cases = [
+            LoadCase(
+                joints=np.array([at]),
+                forces=size * np.eye(3)[[along]],
+                supports=np.array([0, 8, 72, 80]),
+            )
+            for size in (0.01, -0.01)
+        ]
+        there, back = (
+            loaded_state(dome, opened, case).equilibrium.state.positions for case in cases
+        )
         return (there - back)[dome.joints[seen], across]
 
     there, back = moved(40, 2, 13, 0), moved(13, 0, 40, 2)
@@ -62,17 +75,26 @@ def test_forces_and_displacements_are_reciprocal(dome, opened):
 
 
 def test_a_force_on_a_support_changes_nothing(dome, opened):
-    case = LoadCase(joints=np.array([8]), forces=np.array([[3.0, -2.0, 5.0]]), supports=np.array([0, 8, 72, 80]))
+    case = LoadCase(
+        joints=np.array([8]), forces=np.array([[3.0, -2.0, 5.0]]), supports=np.array([0, 8, 72, 80])
+    )
     assert loaded_state(dome, opened, case).deflections.max() < 1e-9
 
 
 def test_a_c_shell_under_the_loads_of_its_file(c_shell_data):
     c_shell_data["material"]["density"] = 0.01
-    design = design_from_dict(c_shell_data | {"loads": {"gravity": [0, 0, -9.81], "points": [
-        {"joint": 4, "force": [0, 0, -1e-3]}]}, "supports": [0, 2, 6, 8]})
+    design = design_from_dict(
+        c_shell_data
+        | {
+            "loads": {"gravity": [0, 0, -9.81], "points": [{"joint": 4, "force": [0, 0, -1e-3]}]},
+            "supports": [0, 2, 6, 8],
+        }
+    )
     found = simulate(design)
     assert found.loaded.supports.tolist() == [0, 2, 6, 8]
-    weight = 0.01 * 9.81 * 0.02 * 0.01 * design.scene("deployed").rest_lengths(design.parameters).sum()
+    weight = (
+        0.01 * 9.81 * 0.02 * 0.01 * design.scene("deployed").rest_lengths(design.parameters).sum()
+    )
     assert found.loaded.total_force[2] == pytest.approx(-weight - 1e-3)
     down = found.loaded.equilibrium.state.positions[4, 2] - found.deployed.state.positions[4, 2]
     assert down < 0
@@ -116,12 +138,15 @@ def test_unusable_loads(dome, opened, c_shell_data):
         simulate(light, LoadCase(GRAVITY))
 
 
-@pytest.mark.parametrize("change, message", [
-    ({"loads": {"gravity": [0, 0]}}, "loads.gravity.*must have at least 3"),
-    ({"loads": {"wind": 1}}, "loads.wind: unknown field"),
-    ({"loads": {"points": [{"joint": 1}]}}, r"loads.points\[0\].force: is missing"),
-    ({"supports": [1, 2]}, "supports.*at least 3"),
-])
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        ({"loads": {"gravity": [0, 0]}}, "loads.gravity.*must have at least 3"),
+        ({"loads": {"wind": 1}}, "loads.wind: unknown field"),
+        ({"loads": {"points": [{"joint": 1}]}}, r"loads.points\[0\].force: is missing"),
+        ({"supports": [1, 2]}, "supports.*at least 3"),
+    ],
+)
 def test_fields_of_the_design_file(c_shell_data, write_json_file, change, message):
     with pytest.raises(InputError, match=message):
         load_design(write_json_file("design.json", c_shell_data | change))
@@ -132,7 +157,9 @@ def test_command_line(repository, capsys):
     assert main(["simulate", path, "--gravity", "20", "--json"]) == 0
     loaded = json.loads(capsys.readouterr().out)["loaded"]
     assert loaded["gravity"] == [0, 0, -20] and loaded["deflection"]["max_percent"] > 0
-    assert loaded["strength"]["utilisation"] == pytest.approx(loaded["strength"]["equivalent_stress"] / 4e7)
+    assert loaded["strength"]["utilisation"] == pytest.approx(
+        loaded["strength"]["equivalent_stress"] / 4e7
+    )
     assert main(["simulate", path, "--gravity=0,0,-9.81"]) == 0
     text = capsys.readouterr().out
     assert "deflection       max 0.000657" in text and "of the elastic limit" in text

@@ -1,4 +1,5 @@
 """Reuse of parts, on cases counted by hand and on random ones."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -7,13 +8,24 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from kop_exudyn.analysis.reuse import (average_reuse, counts_of, disconnected, fabricated, jaccard_matrix,
-                                       kit_size_percent, part_users, reuse, reuse_figures, subset_reuse)
+from kop_exudyn.analysis.reuse import (
+    average_reuse,
+    counts_of,
+    disconnected,
+    fabricated,
+    jaccard_matrix,
+    kit_size_percent,
+    part_users,
+    reuse,
+    reuse_figures,
+    subset_reuse,
+)
 
 # three parts: both designs use the first, each has one of its own
 PAIR = np.array([[4, 2, 0], [2, 0, 2]])
-tables = hnp.arrays(int, st.tuples(st.integers(2, 5), st.integers(1, 6)), elements=st.integers(0, 9)).filter(
-    lambda counts: (counts.sum(axis=1) > 0).all())
+tables = hnp.arrays(
+    int, st.tuples(st.integers(2, 5), st.integers(1, 6)), elements=st.integers(0, 9)
+).filter(lambda counts: (counts.sum(axis=1) > 0).all())
 
 
 def test_two_designs_by_hand():
@@ -43,7 +55,11 @@ def test_pieces_by_kind_make_one_table():
     assert counts_of(designs).tolist() == [[1, 3, 0], [0, 1, 1]]
     assert counts_of(designs, "linear").tolist() == [[3, 0], [1, 1]]
     figures = reuse_figures(designs)
-    assert figures["pieces"] == 5 and figures["elements"] == 6 and figures["by_kind"] == {"angular": 0, "linear": 1 / 4}
+    assert (
+        figures["pieces"] == 5
+        and figures["elements"] == 6
+        and figures["by_kind"] == {"angular": 0, "linear": 1 / 4}
+    )
     assert figures["parts_of_one_design"] == 2 and figures["groups"] == [[0, 1]]
 
 

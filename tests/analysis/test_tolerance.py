@@ -1,14 +1,24 @@
-"""Fabrication errors: sensitivities against re-solved equilibria, on a C-shell of four by four rods."""
+"""Fabrication errors: sensitivities against re-solved equilibria, on a C-shell of four by four
+rods."""
+
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from kop_exudyn.analysis.tolerance import (
-    Tolerance, joint_jacobian, predicted_displacements, predicted_spread, relative_tolerance, robustness,
-    sample_spread, sampled_spread, shares_by_kind)
+    Tolerance,
+    joint_jacobian,
+    predicted_displacements,
+    predicted_spread,
+    relative_tolerance,
+    robustness,
+    sample_spread,
+    sampled_spread,
+    shares_by_kind,
+)
 from kop_exudyn.errors import InputError, SimulationFailure
-from kop_exudyn.optimize.objective import DesignObjective
+from kop_exudyn.search.objective import DesignObjective
 from kop_exudyn.structures.base import design_from_dict
 
 SMALL = Tolerance(length=1e-4, angle=1e-4)  # of spans of 1
@@ -16,14 +26,25 @@ SMALL = Tolerance(length=1e-4, angle=1e-4)  # of spans of 1
 
 @pytest.fixture(scope="module")
 def built():
-    lines = [[[-0.2, y], [2.2, y]] for y in (0.0, 1.0, 2.0)] + [[[x, -0.2], [x, 2.2]] for x in (0.0, 1.0, 2.0)]
-    design = design_from_dict({
-        "format": "kop_exudyn/design", "version": 1, "class": "c_shell", "name": "grid",
-        "material": {"young": 2100.0, "poisson": 0.35},
-        "section": {"type": "rectangle", "width": 0.02, "height": 0.01},
-        "curves": [{"type": "polyline", "points": points} for points in lines],
-        "crossings": "find", "free_ends": False, "rod_offset": 0.0,
-        "opening": {"angle": 0.6, "side": "up"}, "elements_per_piece": 2})
+    lines = [[[-0.2, y], [2.2, y]] for y in (0.0, 1.0, 2.0)] + [
+        [[x, -0.2], [x, 2.2]] for x in (0.0, 1.0, 2.0)
+    ]
+    design = design_from_dict(
+        {
+            "format": "kop_exudyn/design",
+            "version": 1,
+            "class": "c_shell",
+            "name": "grid",
+            "material": {"young": 2100.0, "poisson": 0.35},
+            "section": {"type": "rectangle", "width": 0.02, "height": 0.01},
+            "curves": [{"type": "polyline", "points": points} for points in lines],
+            "crossings": "find",
+            "free_ends": False,
+            "rod_offset": 0.0,
+            "opening": {"angle": 0.6, "side": "up"},
+            "elements_per_piece": 2,
+        }
+    )
     objective = DesignObjective(design)
     return design, objective.judge(design.parameters, dict(objective.reference.equilibria))
 
@@ -36,7 +57,8 @@ def test_small_errors_agree_with_the_sensitivities(built):
     assert difference < 0.02 * np.abs(moved).max()
     first_order = predicted_spread(design, evaluation, SMALL)
     sampled = sampled_spread(samples, evaluation.fit.diagonal)
-    assert sampled.rms_percent == pytest.approx(first_order.rms_percent, rel=0.35)  # a dozen samples' own spread
+    # a dozen samples' own spread
+    assert sampled.rms_percent == pytest.approx(first_order.rms_percent, rel=0.35)
 
 
 def test_the_linear_prediction_is_second_order_accurate(built):
@@ -55,7 +77,9 @@ def test_spread_is_linear_in_the_tolerance_and_shared_by_kind(built):
     once, twice = (predicted_spread(design, evaluation, SMALL.scaled(k)) for k in (1, 2))
     assert np.allclose(twice.joints, 2 * once.joints) and once.worst_percent >= once.rms_percent > 0
     shares = shares_by_kind(design, evaluation, SMALL)
-    assert set(shares) == {group.kind for group in design.groups} and sum(shares.values()) == pytest.approx(1)
+    assert set(shares) == {group.kind for group in design.groups} and sum(
+        shares.values()
+    ) == pytest.approx(1)
     assert shares_by_kind(design, evaluation, replace(SMALL, angle=0))["linear"] == pytest.approx(1)
 
 
@@ -82,7 +106,11 @@ def test_robustness_is_plain_and_tells_agreement_and_failures(built):
     design, evaluation = built
     found = robustness(design, evaluation, relative_tolerance(design, 1e-4, 1e-4), (1, 30), 4)
     small, large = found["sizes"]
-    lengths = [design.parameters[group.indices].ravel() for group in design.groups if group.kind == "linear"]
+    lengths = [
+        design.parameters[group.indices].ravel()
+        for group in design.groups
+        if group.kind == "linear"
+    ]
     assert found["length"] == 1e-4 * np.median(np.concatenate(lengths))
     assert 5 * small["linear_error"] < large["linear_error"] < 0.1 and small["failed"] == 0
     assert large["predicted_rms_percent"] == pytest.approx(30 * small["predicted_rms_percent"])

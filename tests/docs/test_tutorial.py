@@ -1,4 +1,6 @@
-"""The tutorial, word by word: every command of its page succeeds, prints what the page shows, and makes its figures."""
+"""The tutorial, word by word: every command of its page succeeds, prints what the page shows, and
+makes its figures."""
+
 import csv
 import importlib.util
 import re
@@ -38,8 +40,14 @@ def followed(tmp_path_factory):
 
 
 def test_all_blocks_of_the_page_are_steps():
-    assert PAGE.count("```{code-block}") == sum(1 for _ in re.finditer(r"^```\{code-block\} (?:python|console)", PAGE, re.M))
-    assert sum(step.command is not None for step in tutorial.steps(PAGE)) == len(re.findall(r"^\$ ", PAGE, re.M)) > 8
+    assert PAGE.count("```{code-block}") == sum(
+        1 for _ in re.finditer(r"^```\{code-block\} (?:python|console)", PAGE, re.M)
+    )
+    assert (
+        sum(step.command is not None for step in tutorial.steps(PAGE))
+        == len(re.findall(r"^\$ ", PAGE, re.M))
+        > 8
+    )
 
 
 def test_commands_print_what_the_page_shows(followed):
@@ -74,18 +82,26 @@ def test_every_figure_is_made_by_the_commands_and_kept(followed):
 
 def test_pieces_that_the_text_counts(followed):
     straight, corners = re.search(r"has (\d+) straight pieces and (\d+) corners", PAGE).groups()
-    with open(followed[0] / "files" / "workshop" / "assembly_vault.csv", newline="", encoding="utf-8") as file:
+    with open(
+        followed[0] / "files" / "workshop" / "assembly_vault.csv", newline="", encoding="utf-8"
+    ) as file:
         kinds = [row["kind"] for row in csv.DictReader(file)]
     assert (kinds.count("linear"), kinds.count("angular")) == (int(straight), int(corners))
 
 
 def _same_pieces(shown: list[str], printed: list[str]) -> None:
-    """A cut list of as many parts and pieces. Which ones they are depends on rounding: kits are local minima."""
+    """A cut list of as many parts and pieces. Which ones they are depends on rounding: kits are
+    local minima."""
     expected, found = (list(csv.DictReader(lines)) for lines in (shown, printed))
-    assert [(row["part"], row["kind"], *row) for row in found] == [(row["part"], row["kind"], *row) for row in expected]
+    assert [(row["part"], row["kind"], *row) for row in found] == [
+        (row["part"], row["kind"], *row) for row in expected
+    ]
     for kind in ("angular", "linear"):
         for column in (name for name in expected[0] if name.startswith("in_")):
-            counts = [sum(int(row[column]) for row in rows if row["kind"] == kind) for rows in (expected, found)]
+            counts = [
+                sum(int(row[column]) for row in rows if row["kind"] == kind)
+                for rows in (expected, found)
+            ]
             assert counts[0] == counts[1] > 0, (kind, column)
 
 

@@ -1,4 +1,5 @@
 """Many sparse right-hand sides at once against dense solves."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -10,10 +11,13 @@ from kop_exudyn.equilibrium.factorisation import Factorisation
 
 
 def chain(bodies: int, size: int, seed: int) -> sp.csc_matrix:
-    """A positive definite matrix of coupled blocks, in rings of neighbours, as bodies of a structure have."""
+    """A positive definite matrix of coupled blocks, in rings of neighbours, as bodies of a
+    structure have."""
     rng = np.random.default_rng(seed)
     apart = np.abs(np.subtract.outer(np.arange(bodies), np.arange(bodies)))
-    dense = np.kron(np.isin(apart, (0, 1, 5)), np.ones((size, size))) * rng.normal(size=(bodies * size,) * 2)
+    dense = np.kron(np.isin(apart, (0, 1, 5)), np.ones((size, size))) * rng.normal(
+        size=(bodies * size,) * 2
+    )
     symmetric = dense + dense.T
     return sp.csc_matrix(symmetric + np.diag(1 + np.abs(symmetric).sum(axis=1)))
 
@@ -22,7 +26,9 @@ def whole(solutions: Solutions) -> np.ndarray:
     return solutions.rows(np.arange(len(solutions.place)))
 
 
-@pytest.mark.parametrize("bodies, size, count", [(30, 6, 200), (25, 7, 72), (40, 1, 5), (1, 3, 1), (12, 4, 73)])
+@pytest.mark.parametrize(
+    "bodies, size, count", [(30, 6, 200), (25, 7, 72), (40, 1, 5), (1, 3, 1), (12, 4, 73)]
+)
 def test_same_as_a_dense_solve(bodies, size, count):
     matrix = chain(bodies, size, seed=bodies)
     factorisation = Factorisation()
@@ -35,7 +41,9 @@ def test_same_as_a_dense_solve(bodies, size, count):
     some = rng.integers(matrix.shape[0], size=5)
     assert np.array_equal(solutions.rows(some), whole(solutions)[some])
     sparse = sp.random(7, matrix.shape[0], density=0.2, random_state=rng, format="csr")
-    np.testing.assert_allclose(solutions.product(sparse), sparse @ whole(solutions), rtol=1e-10, atol=1e-13)
+    np.testing.assert_allclose(
+        solutions.product(sparse), sparse @ whole(solutions), rtol=1e-10, atol=1e-13
+    )
 
 
 def test_a_border_makes_up_for_a_matrix_that_is_nearly_singular():
@@ -49,7 +57,9 @@ def test_a_border_makes_up_for_a_matrix_that_is_nearly_singular():
     expected = np.linalg.solve(bordered, np.vstack([rhs, np.zeros(80)]))[:n]
     factorisation = Factorisation()
     factorisation.update(sp.csc_matrix(np.triu(matrix)))
-    found = whole(factorisation.solve_columns(sp.csc_matrix(rhs), constraint, factorisation.solve(constraint)))
+    found = whole(
+        factorisation.solve_columns(sp.csc_matrix(rhs), constraint, factorisation.solve(constraint))
+    )
     np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-5)
     np.testing.assert_allclose(constraint @ found, 0.0, atol=1e-5)
 

@@ -1,4 +1,5 @@
 """Equilibria against Exudyn's static solver."""
+
 from __future__ import annotations
 
 from dataclasses import replace
@@ -26,11 +27,20 @@ def confirmed(scene, q=np.zeros(0), opening=None):
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-@pytest.mark.parametrize("options", [
-    {}, {"weight": False}, {"terms": False}, {"actuated": False}, {"oblique": False},
-    {"weight": False, "terms": False, "actuated": False}])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"weight": False},
+        {"terms": False},
+        {"actuated": False},
+        {"oblique": False},
+        {"weight": False, "terms": False, "actuated": False},
+    ],
+)
 def test_every_feature_is_confirmed(wheel, options, seed):
-    """Offsets, frames, hinges free, driven and constant, straight and oblique, driven coordinates, all loads."""
+    """Offsets, frames, hinges free, driven and constant, straight and oblique, driven coordinates,
+    all loads."""
     case = wheel(seed=seed, **options)
     eq, confirmation = confirmed(case.scene, case.q, case.opening)
     assert np.allclose(confirmation.state.angles, eq.state.angles, atol=1e-7)
@@ -53,10 +63,13 @@ def test_moments(strut, kind):
 
 
 def test_actuators():
-    """A rod from one plate to another one, whose normals point away from each other, is pushed away."""
+    """A rod from one plate to another one, whose normals point away from each other, is pushed
+    away."""
     builder = SceneBuilder()
     down = np.diag([1.0, -1, -1])
-    bodies = builder.bodies(np.linspace([0, 0, 0], [1, 0, 0.1], 5), np.concatenate([down[None], [np.eye(3)] * 4]))
+    bodies = builder.bodies(
+        np.linspace([0, 0, 0], [1, 0, 0.1], 5), np.concatenate([down[None], [np.eye(3)] * 4])
+    )
     frames = np.concatenate([down[None], [np.eye(3)] * 4])
     builder.rod(builder.nodes(bodies, frame=frames), [2e4, 1e4, 1e4, 1, 1, 2], length=1.0)
     builder.pin(bodies[0])

@@ -46,7 +46,10 @@ def test_result_is_a_stable_equilibrium(wheel, options):
 
 def test_plain_newton_and_the_mixed_iteration_agree(wheel):
     case = wheel()
-    mixed, plain = (solve_fresh(case, options=NewtonOptions(mixed=m, tolerance=1e-11, max_iterations=2000))[1] for m in (True, False))
+    mixed, plain = (
+        solve_fresh(case, options=NewtonOptions(mixed=m, tolerance=1e-11, max_iterations=2000))[1]
+        for m in (True, False)
+    )
     assert np.allclose(mixed.state.positions, plain.state.positions, atol=1e-8)
     assert mixed.torque == pytest.approx(plain.torque, rel=1e-6)
 
@@ -70,13 +73,17 @@ def test_small_changes_of_lengths_take_few_iterations(net):
     for k in range(1, 7):
         eq = solve(system, case.q, eq, case.opening - 0.1 * k)
     rng = np.random.default_rng(1)
-    few = [solve(system, case.q * (1 + 1e-3 * rng.normal(size=len(case.q))), eq, eq.opening).iterations for _ in range(5)]
+    few = [
+        solve(system, case.q * (1 + 1e-3 * rng.normal(size=len(case.q))), eq, eq.opening).iterations
+        for _ in range(5)
+    ]
     assert np.median(few) <= 5
 
 
 @pytest.mark.parametrize("load", [1.05, 1.5, 3.0, 12.0])
 def test_a_straight_strut_above_its_euler_load_is_never_returned(strut, load):
-    """Started exactly straight, an unstable equilibrium; 12 times the Euler load is above the second one too."""
+    """Started exactly straight, an unstable equilibrium; 12 times the Euler load is above the
+    second one too."""
     eq = solve(System(strut(force=load * EULER)), np.zeros(0))
     assert eq.escapes >= 1
     assert abs(eq.state.positions[-1, 2]) > 0.2
@@ -94,7 +101,10 @@ def test_the_side_of_a_pitchfork_can_be_chosen(strut, sign):
     system = System(scene)
     side = np.zeros(scene.n_dofs)
     side[6 * (scene.n_bodies - 1) + 2] = sign
-    states = [solve(system, np.zeros(0), options=NewtonOptions(side=side[system.sparsity.free])).state for _ in range(2)]
+    states = [
+        solve(system, np.zeros(0), options=NewtonOptions(side=side[system.sparsity.free])).state
+        for _ in range(2)
+    ]
     assert np.sign(states[0].positions[-1, 2]) == sign
     assert np.array_equal(states[0].positions, states[1].positions)  # reproducibly
 
@@ -105,13 +115,24 @@ def test_the_state_does_not_depend_on_units_or_placement(wheel):
     scene, m, f = case.scene, 1e3, 1e-6  # millimetres, and forces in another unit
     per_q = np.concatenate([np.full(12, m), [1.0, m]])
     initial = replace(scene.initial, positions=m * scene.initial.positions)
-    driven = replace(scene.driven, constants=scene.driven.constants * np.where(scene.driven.dofs < 6 * scene.n_bodies, m, 1))
+    driven = replace(
+        scene.driven,
+        constants=scene.driven.constants * np.where(scene.driven.dofs < 6 * scene.n_bodies, m, 1),
+    )
     scaled = replace(
-        scene, initial=initial, node_offset=m * scene.node_offset, hinge_centre=m * scene.hinge_centre,
+        scene,
+        initial=initial,
+        node_offset=m * scene.node_offset,
+        hinge_centre=m * scene.hinge_centre,
         length_constant=m * scene.length_constant,
-        stiffness=f * scene.stiffness * np.array([1, 1, 1, m**2, m**2, m**2]), driven=driven,
-        rest_strain=scene.rest_strain / np.array([1, 1, 1, m, m, m]), weight=scene.weight * f / m)
-    other = solve(System(scaled), case.q * per_q, opening=case.opening, options=NewtonOptions(tolerance=1e-12))
+        stiffness=f * scene.stiffness * np.array([1, 1, 1, m**2, m**2, m**2]),
+        driven=driven,
+        rest_strain=scene.rest_strain / np.array([1, 1, 1, m, m, m]),
+        weight=scene.weight * f / m,
+    )
+    other = solve(
+        System(scaled), case.q * per_q, opening=case.opening, options=NewtonOptions(tolerance=1e-12)
+    )
     assert np.allclose(other.state.positions, m * eq.state.positions, atol=1e-9 * m)
     assert other.torque == pytest.approx(eq.torque * f * m, rel=1e-8)
     assert other.iterations == eq.iterations
@@ -142,7 +163,7 @@ def test_moments_without_potential_roll_a_beam_up(strut):
     assert np.abs(eq.state.positions[-1]).max() < 1e-8
 
 
-# -- what is computed ----------------------------------------------------------------------------------------------
+# -- what is computed --------------------------------------------------------------------------
 def test_a_line_search_asks_for_energies_only(strut):
     system = System(strut(force=1.5 * EULER))
     eq = solve(system, np.zeros(0), options=NewtonOptions(mixed=False))
@@ -153,14 +174,19 @@ def test_a_line_search_asks_for_energies_only(strut):
 
 
 def test_a_warm_solve_without_changes_costs_one_check(wheel):
-    """One assembly finds it converged at the stress it brought along, so that its factorisation tells whether it is stable."""
+    """One assembly finds it converged at the stress it brought along, so that its factorisation
+    tells whether it is stable."""
     case = wheel()
     system, eq = solve_fresh(case)
     before = replace(system.counters)
     again = solve(system, case.q, eq, case.opening)
     c = system.counters
     assert again.iterations == 0
-    assert (c.hessians - before.hessians, c.factorisations - before.factorisations, c.energies - before.energies) == (1, 1, 0)
+    assert (
+        c.hessians - before.hessians,
+        c.factorisations - before.factorisations,
+        c.energies - before.energies,
+    ) == (1, 1, 0)
 
 
 def test_the_system_holds_the_solutions_factorisation(wheel):
@@ -172,20 +198,26 @@ def test_the_system_holds_the_solutions_factorisation(wheel):
 
 @pytest.mark.parametrize("change", [0.0, 1e-7, 1e-3, 2e-2])
 def test_derivatives_are_those_that_another_process_finds(wheel, change):
-    """To the last bit: whoever solved the state, and from wherever. Optimisations magnify any difference."""
+    """To the last bit: whoever solved the state, and from wherever. Optimisations magnify any
+    difference."""
     case = wheel()
     system, eq = solve_fresh(case)
     q = eq.q * (1 + change * np.random.default_rng(0).uniform(-1, 1, len(eq.q)))
     found = solve(system, q, Sensitivities(system, eq).predict(q - eq.q), case.opening)
-    here, there = Sensitivities(system, found), Sensitivities(System(case.scene), pickle.loads(pickle.dumps(found)))
+    here, there = (
+        Sensitivities(system, found),
+        Sensitivities(System(case.scene), pickle.loads(pickle.dumps(found))),
+    )
     dq = 1e-3 * eq.q
     for a, b in ((here.predict(dq), there.predict(dq)), (here, there)):
-        names = ("torque", "stress") if a is not here else ("full", "energy_gradient", "energy_hessian")
+        names = (
+            ("torque", "stress") if a is not here else ("full", "energy_gradient", "energy_hessian")
+        )
         for name in names:
             np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)
 
 
-# -- failures ------------------------------------------------------------------------------------------------------
+# -- failures ----------------------------------------------------------------------------------
 def test_lengths_that_are_not_positive(wheel):
     case = wheel()
     q = case.q.copy()

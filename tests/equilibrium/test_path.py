@@ -1,4 +1,5 @@
 """Paths through limit points and bifurcations."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -22,14 +23,28 @@ def truss(rise: float, spring: float = 0.0):
     tilt = np.arctan(rise)
 
     def frame(angle):
-        return np.array([[np.cos(angle), 0, -np.sin(angle)], [0, 1, 0], [np.sin(angle), 0, np.cos(angle)]])
+        return np.array(
+            [[np.cos(angle), 0, -np.sin(angle)], [0, 1, 0], [np.sin(angle), 0, np.cos(angle)]]
+        )
 
     # next to no stiffness against anything but stretch
     K = [EA, 1e-9, 1e-9, 1e-9, 1e-9, 1e-9]
-    builder.rod([builder.nodes(ends[:1], frame=frame(tilt))[0], builder.nodes(ends[1:2], frame=frame(tilt))[0]], K,
-                length=np.hypot(1, rise))
-    builder.rod([builder.nodes(ends[1:2], frame=frame(-tilt))[0], builder.nodes(ends[2:], frame=frame(-tilt))[0]], K,
-                length=np.hypot(1, rise))
+    builder.rod(
+        [
+            builder.nodes(ends[:1], frame=frame(tilt))[0],
+            builder.nodes(ends[1:2], frame=frame(tilt))[0],
+        ],
+        K,
+        length=np.hypot(1, rise),
+    )
+    builder.rod(
+        [
+            builder.nodes(ends[1:2], frame=frame(-tilt))[0],
+            builder.nodes(ends[2:], frame=frame(-tilt))[0],
+        ],
+        K,
+        length=np.hypot(1, rise),
+    )
     builder.pin(ends[0])
     builder.pin(ends[2])
     builder.pin(ends[1], (0, 1, 3, 4, 5))
@@ -40,7 +55,12 @@ def column(imperfection: float = 0.0, n: int = 8):
     builder = SceneBuilder()
     x = np.linspace(0, 1, n + 1)
     bodies = builder.bodies(np.stack([x, 0 * x, 0 * x], axis=1))
-    builder.rod(builder.nodes(bodies), [1e5, 1e4, 1e4, 0.8, 1.0, 2.0], length=1.0, curvature=[0, 2 * imperfection, 0])
+    builder.rod(
+        builder.nodes(bodies),
+        [1e5, 1e4, 1e4, 0.8, 1.0, 2.0],
+        length=1.0,
+        curvature=[0, 2 * imperfection, 0],
+    )
     builder.pin(0)
     for body in bodies[1:]:
         builder.pin(body, (1, 3, 5))
@@ -48,25 +68,41 @@ def column(imperfection: float = 0.0, n: int = 8):
 
 
 def test_two_bars_against_the_closed_form():
-    """The element's axial strain with its ends' axes held: u = A p, whose x part is the chord along the rest axis."""
+    """The element's axial strain with its ends' axes held: u = A p, whose x part is the chord along
+    the rest axis."""
     rise = 0.1
-    path = trace(truss(rise), np.zeros(0), DeadForces([1], [0, 0, -1.0]), stop=lambda p: p.displacement > 0.25 - rise)
+    path = trace(
+        truss(rise),
+        np.zeros(0),
+        DeadForces([1], [0, 0, -1.0]),
+        stop=lambda p: p.displacement > 0.25 - rise,
+    )
     w = path.displacements + rise  # downward from the start
-    l = np.hypot(1, rise)
-    # with fixed axes phi = 0, so e = R_0^T (x_1 - x_0) - (l, 0, 0): a linear spring along the rest direction
-    assert np.allclose(path.factors, 2 * EA / l * (rise / l) ** 2 * w, rtol=1e-5)
+    length = np.hypot(1, rise)
+    # with fixed axes phi = 0, so e = R_0^T (x_1 - x_0) - (l, 0, 0): a linear spring along the rest
+    # direction
+    assert np.allclose(path.factors, 2 * EA / length * (rise / length) ** 2 * w, rtol=1e-5)
     assert path.critical == ()
 
 
 def test_an_actuated_scene_is_traced_in_its_torque(net):
-    """From the plane through the buckling that leaves it: the path stays in the plane and says that it is unstable."""
+    """From the plane through the buckling that leaves it: the path stays in the plane and says that
+    it is unstable."""
     case = net(5)
     system = System(case.scene)
     start = solve(system, case.q, opening=case.opening - 0.1)
-    path = trace(case.scene, case.q, stop=lambda p: p.displacement < case.opening - 0.5, direction=-1, start=start)
+    path = trace(
+        case.scene,
+        case.q,
+        stop=lambda p: p.displacement < case.opening - 0.5,
+        direction=-1,
+        start=start,
+    )
     first, last = path.points[0], path.points[-1]
     assert first.held and not last.held
-    assert first.factor == pytest.approx(-start.torque) and first.displacement == pytest.approx(start.opening)
+    assert first.factor == pytest.approx(-start.torque) and first.displacement == pytest.approx(
+        start.opening
+    )
     for point in path.points[::3]:
         assert np.abs(point.state.positions[:, 2]).max() < 1e-9
         eq = solve(system, case.q, point.state, point.displacement)
@@ -78,8 +114,13 @@ def test_an_actuated_scene_is_traced_in_its_torque(net):
 
 
 def test_euler_load_is_found_as_a_bifurcation():
-    path = trace(column(), np.zeros(0), DeadForces([8], [-1.0, 0, 0]), stop=lambda p: p.factor > 30,
-                 options=PathOptions(rotation=0.01))
+    path = trace(
+        column(),
+        np.zeros(0),
+        DeadForces([8], [-1.0, 0, 0]),
+        stop=lambda p: p.factor > 30,
+        options=PathOptions(rotation=0.01),
+    )
     kinds = [(c.kind, c.point.factor) for c in path.critical]
     loads = [load for kind, load in kinds if kind == "bifurcation"]
     assert loads[0] == pytest.approx(np.pi**2 / 4, rel=0.005)
@@ -94,7 +135,9 @@ def test_euler_load_is_found_as_a_bifurcation():
 
 
 def test_the_imperfect_column_has_no_critical_point():
-    path = trace(column(0.02), np.zeros(0), DeadForces([8], [-1.0, 0, 0]), stop=lambda p: p.factor > 3)
+    path = trace(
+        column(0.02), np.zeros(0), DeadForces([8], [-1.0, 0, 0]), stop=lambda p: p.factor > 3
+    )
     assert path.critical == () and all(p.stable for p in path.points)
 
 
@@ -113,7 +156,8 @@ def test_points_are_equilibria_and_eigenvalues_agree():
         if min(abs(point.factor - c.point.factor) for c in path.critical) > 1e-3:
             assert (softest_mode(system).eigenvalue > 0) == point.stable
     rates = np.diff(path.displacements)
-    assert (rates > 0).all() and all(p.held for p in path.points)  # no snap-back: held, the arch is always stable
+    # no snap-back: held, the arch is always stable
+    assert (rates > 0).all() and all(p.held for p in path.points)
 
 
 def test_a_limit_point_is_where_the_factor_is_extreme():
@@ -121,19 +165,37 @@ def test_a_limit_point_is_where_the_factor_is_extreme():
     path = trace(scene, np.zeros(0), load, stop=lambda p: p.displacement > 0.12)
     top, bottom = path.critical
     assert top.point.factor >= path.factors[path.displacements < 0].max() - 1e-9
-    finer = trace(scene, np.zeros(0), load, stop=lambda p: p.displacement > 0.12, options=PathOptions(rotation=0.01))
+    finer = trace(
+        scene,
+        np.zeros(0),
+        load,
+        stop=lambda p: p.displacement > 0.12,
+        options=PathOptions(rotation=0.01),
+    )
     assert finer.first("limit").point.factor == pytest.approx(top.point.factor, rel=2e-7)
     assert abs(top.point.factor_rate) < 1e-3 * path.points[0].factor_rate
     stable = [p for p in path.points if p.stable]
-    assert stable[0].displacement < top.point.displacement < bottom.point.displacement < stable[-1].displacement
+    assert (
+        stable[0].displacement
+        < top.point.displacement
+        < bottom.point.displacement
+        < stable[-1].displacement
+    )
 
 
 def test_it_can_be_traced_backwards():
     scene, load = arch()
     there = trace(scene, np.zeros(0), load, stop=lambda p: p.displacement > 0.12)
     end = there.points[-1]
-    back = trace(scene, np.zeros(0), load, stop=lambda p: p.displacement < -0.095, start=end.state, factor=end.factor,
-                 direction=-1)
+    back = trace(
+        scene,
+        np.zeros(0),
+        load,
+        stop=lambda p: p.displacement < -0.095,
+        start=end.state,
+        factor=end.factor,
+        direction=-1,
+    )
     factors = [c.point.factor for c in back.critical]
     assert factors == pytest.approx([c.point.factor for c in reversed(there.critical)], rel=1e-7)
 
@@ -146,8 +208,18 @@ def arch(n: int = 12):
     gap = np.diff(builder._positions[0], axis=0)
     tilt = np.arctan2(gap[:, 2], gap[:, 0])
     for k in range(n):
-        frame = np.array([[np.cos(tilt[k]), 0, -np.sin(tilt[k])], [0, 1, 0], [np.sin(tilt[k]), 0, np.cos(tilt[k])]])
-        builder.rod(builder.nodes(bodies[k: k + 2], frame=frame), [3e3, 1e3, 1e3, 1, 1.0, 1], length=np.linalg.norm(gap[k]))
+        frame = np.array(
+            [
+                [np.cos(tilt[k]), 0, -np.sin(tilt[k])],
+                [0, 1, 0],
+                [np.sin(tilt[k]), 0, np.cos(tilt[k])],
+            ]
+        )
+        builder.rod(
+            builder.nodes(bodies[k : k + 2], frame=frame),
+            [3e3, 1e3, 1e3, 1, 1.0, 1],
+            length=np.linalg.norm(gap[k]),
+        )
     builder.pin(0)
     builder.pin(n)
     for body in bodies[1:-1]:

@@ -1,4 +1,5 @@
 """Derivatives of equilibria against equilibria solved again."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -10,7 +11,13 @@ from kop_exudyn.equilibrium.system import System
 from kop_exudyn.scene.loads import SpatialMoments
 
 EXACT = NewtonOptions(tolerance=1e-12)
-CASES = [{}, {"weight": False}, {"terms": False}, {"actuated": False}, {"weight": False, "terms": False}]
+CASES = [
+    {},
+    {"weight": False},
+    {"terms": False},
+    {"actuated": False},
+    {"weight": False, "terms": False},
+]
 
 
 class Solved:
@@ -19,7 +26,9 @@ class Solved:
     def __init__(self, case):
         self.case = case
         self.system = System(case.scene)
-        self.eq = refine(self.system, solve(self.system, case.q, opening=case.opening, options=EXACT))
+        self.eq = refine(
+            self.system, solve(self.system, case.q, opening=case.opening, options=EXACT)
+        )
         self.sensitivities = Sensitivities(self.system, self.eq)
 
     def neighbour(self, dq, dopening=0.0):
@@ -31,7 +40,9 @@ class Solved:
         """Orders at which the Taylor remainders of a scalar of the equilibrium fall."""
         at = value(self.eq)
         changes = np.array([value(self.neighbour(h * direction)) - at for h in steps])
-        remainders = np.abs([changes - steps * first, changes - steps * first - 0.5 * steps**2 * second])
+        remainders = np.abs(
+            [changes - steps * first, changes - steps * first - 0.5 * steps**2 * second]
+        )
         return tuple(np.polyfit(np.log(steps), np.log(r), 1)[0] for r in remainders)
 
 
@@ -56,13 +67,21 @@ def test_all_first_derivatives_against_central_differences(solved):
         dq[k] = h
         a, b, c, d = (solved.neighbour(s * dq) for s in (2, 1, -1, -2))
 
-        def fourth_order(value):
+        def fourth_order(value, a=a, b=b, c=c, d=d):
             return (8 * (value(b) - value(c)) - (value(a) - value(d))) / (12 * h)
 
-        differences.append([fourth_order(lambda e: e.state.positions.ravel()), fourth_order(lambda e: e.state.angles),
-                            fourth_order(lambda e: e.elastic_energy), fourth_order(lambda e: e.torque),
-                            fourth_order(lambda e: e.potential)])
-    positions, angles, energies, torques, potentials = (np.array(column) for column in zip(*differences))
+        differences.append(
+            [
+                fourth_order(lambda e: e.state.positions.ravel()),
+                fourth_order(lambda e: e.state.angles),
+                fourth_order(lambda e: e.elastic_energy),
+                fourth_order(lambda e: e.torque),
+                fourth_order(lambda e: e.potential),
+            ]
+        )
+    positions, angles, energies, torques, potentials = (
+        np.array(column) for column in zip(*differences)
+    )
     assert relative(X, positions.T) < 1e-6
     assert relative(A, angles.T) < 1e-6
     assert relative(E, energies) < 1e-6
@@ -85,7 +104,15 @@ def test_taylor_slopes_of_the_potential(solved):
     orders = []
     for seed in (2, 3):
         d = 0.02 * np.random.default_rng(seed).normal(size=len(solved.case.q))
-        orders.append(solved.slopes(lambda e: e.potential, se.potential_gradient @ d, d @ se.potential_hessian @ d, d, steps))
+        orders.append(
+            solved.slopes(
+                lambda e: e.potential,
+                se.potential_gradient @ d,
+                d @ se.potential_hessian @ d,
+                d,
+                steps,
+            )
+        )
     assert np.median(orders, axis=0) == pytest.approx([2, 3], abs=0.2)
     assert np.allclose(se.potential_hessian, se.potential_hessian.T)
 
@@ -95,8 +122,13 @@ def test_elastic_hessian_of_an_unloaded_scene(wheel):
     se = solved.sensitivities
     assert np.array_equal(se.energy_hessian, se.potential_hessian)
     d = 0.02 * np.random.default_rng(4).normal(size=len(solved.case.q))
-    orders = solved.slopes(lambda e: e.elastic_energy, se.energy_gradient @ d, d @ se.energy_hessian @ d, d,
-                           2.0 ** -np.arange(2, 7))
+    orders = solved.slopes(
+        lambda e: e.elastic_energy,
+        se.energy_gradient @ d,
+        d @ se.energy_hessian @ d,
+        d,
+        2.0 ** -np.arange(2, 7),
+    )
     assert orders == pytest.approx((2, 3), abs=0.2)
 
 
@@ -122,7 +154,12 @@ def test_prediction_is_of_first_order_and_saves_iterations(solved):
     assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(2, abs=0.2)
     assert np.polyfit(np.log(steps), np.log(stresses), 1)[0] == pytest.approx(2, abs=0.2)
     start = solved.sensitivities.predict(1e-3 * d)
-    assert solve(System(solved.case.scene), solved.case.q + 1e-3 * d, start, solved.case.opening).iterations <= 3
+    assert (
+        solve(
+            System(solved.case.scene), solved.case.q + 1e-3 * d, start, solved.case.opening
+        ).iterations
+        <= 3
+    )
 
 
 def test_one_adjoint_costs_one_solve_and_no_assembly(solved):

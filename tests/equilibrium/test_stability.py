@@ -1,11 +1,13 @@
 """Inertia, softest modes, factorisation."""
+
 from __future__ import annotations
 
 import numpy as np
 import pytest
 import scipy.linalg
 import scipy.sparse as sp
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from kop_exudyn.equilibrium.direction import Border, bordered_solve, factorise_convex, is_convex
 from kop_exudyn.equilibrium.factorisation import Factorisation
@@ -23,7 +25,12 @@ def symmetric(rng, n: int, negative: int) -> np.ndarray:
 
 
 @settings(max_examples=40, deadline=None)
-@given(seed=st.integers(0, 10**6), n=st.integers(2, 30), negative=st.integers(0, 3), columns=st.integers(1, 40))
+@given(
+    seed=st.integers(0, 10**6),
+    n=st.integers(2, 30),
+    negative=st.integers(0, 3),
+    columns=st.integers(1, 40),
+)
 def test_pivots_are_the_inertia_and_solves_are_solves(seed, n, negative, columns):
     rng = np.random.default_rng(seed)
     K = symmetric(rng, n, min(negative, n))
@@ -32,7 +39,9 @@ def test_pivots_are_the_inertia_and_solves_are_solves(seed, n, negative, columns
         assert factorisation.update(sp.csc_matrix(np.triu(K))) == min(negative, n)
         rhs = rng.normal(size=(n, columns)) * (rng.random((n, columns)) < 0.3)
         assert np.allclose(K @ factorisation.solve(rhs), rhs, atol=1e-7)
-        assert np.allclose(factorisation.solve(rhs)[:, 0], factorisation.solve(rhs[:, 0]), atol=1e-8)
+        assert np.allclose(
+            factorisation.solve(rhs)[:, 0], factorisation.solve(rhs[:, 0]), atol=1e-8
+        )
         K = K + 0.0
 
 

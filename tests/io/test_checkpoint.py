@@ -1,4 +1,5 @@
 """Checkpoints go on with the same job, and with no other."""
+
 import logging
 import shutil
 
@@ -9,8 +10,12 @@ from kop_exudyn.errors import InputError
 from kop_exudyn.io.checkpoint import CheckpointStore, Job
 from kop_exudyn.io.run_folder import RunFolder
 
-ARRAYS = {"sqp/x": np.linspace(0, 1, 7), "terms": np.array(["{}", '{"fit": 1}']), "file": np.array(3),
-          "none": np.empty((0, 2))}
+ARRAYS = {
+    "sqp/x": np.linspace(0, 1, 7),
+    "terms": np.array(["{}", '{"fit": 1}']),
+    "file": np.array(3),
+    "none": np.empty((0, 2)),
+}
 
 
 @pytest.fixture
@@ -50,11 +55,14 @@ def test_starting_anew_forgets_older_checkpoints(tmp_path, inputs):
     assert (tmp_path / "c" / "notes.txt").exists()
 
 
-@pytest.mark.parametrize("settings, message", [
-    ({"seed": 1}, "seed was 0 and is now 1"),
-    ({"parts": {"linear": 13}}, "parts.linear was 12 and is now 13"),
-    ({"parts": {"linear": 12, "angular": 5}}, "parts.angular was not given and is now 5"),
-])
+@pytest.mark.parametrize(
+    "settings, message",
+    [
+        ({"seed": 1}, "seed was 0 and is now 1"),
+        ({"parts": {"linear": 13}}, "parts.linear was 12 and is now 13"),
+        ({"parts": {"linear": 12, "angular": 5}}, "parts.angular was not given and is now 5"),
+    ],
+)
 def test_other_settings_are_not_resumed(tmp_path, inputs, settings, message):
     CheckpointStore.open(tmp_path / "c", job(inputs)).save("one", ARRAYS)
     with pytest.raises(InputError, match=f"belong to a different job: {message}"):
@@ -101,11 +109,16 @@ class TestRunFolder:
 
     def test_a_different_job_may_not(self, tmp_path, inputs):
         RunFolder.open(tmp_path / "out", job(inputs)).store.save("one", ARRAYS)
-        with pytest.raises(InputError, match=r"results of a different job \(seed was 0 and is now 1\)"):
+        with pytest.raises(
+            InputError, match=r"results of a different job \(seed was 0 and is now 1\)"
+        ):
             RunFolder.open(tmp_path / "out", job(inputs, seed=1))
         with pytest.raises(InputError, match="can't resume"):
             RunFolder.open(tmp_path / "out", job(inputs, seed=1), resume=True)
-        assert RunFolder.open(tmp_path / "out", job(inputs, seed=1), overwrite=True).store.names() == []
+        assert (
+            RunFolder.open(tmp_path / "out", job(inputs, seed=1), overwrite=True).store.names()
+            == []
+        )
 
     def test_other_peoples_files_are_left_alone(self, tmp_path, inputs):
         (tmp_path / "out").mkdir()

@@ -1,4 +1,5 @@
 """Kits survive the way through a file."""
+
 import numpy as np
 import pytest
 
@@ -15,14 +16,17 @@ def test_round_trip_is_exact(tmp_path):
     np.testing.assert_array_equal(read.vector, kit.vector)
 
 
-@pytest.mark.parametrize("parts, message", [
-    ({}, "kit.json: parts"),
-    ({"linear": []}, r"parts.linear = \[\]: must have at least 1"),
-    ({"linear": [[1, "2"]]}, r"parts.linear\[0\]\[1\] = '2': must be a number"),
-    ({"linear": [[1, 2], [1]]}, "kit.linear"),
-    ({"linear": [[-1, 2]]}, r"kit.linear\[0\] = \[-1.0, 2.0\]: outside"),
-    ({"cubic": [1]}, "unknown kind of parts"),
-])
+@pytest.mark.parametrize(
+    "parts, message",
+    [
+        ({}, "kit.json: parts"),
+        ({"linear": []}, r"parts.linear = \[\]: must have at least 1"),
+        ({"linear": [[1, "2"]]}, r"parts.linear\[0\]\[1\] = '2': must be a number"),
+        ({"linear": [[1, 2], [1]]}, "kit.linear"),
+        ({"linear": [[-1, 2]]}, r"kit.linear\[0\] = \[-1.0, 2.0\]: outside"),
+        ({"cubic": [1]}, "unknown kind of parts"),
+    ],
+)
 def test_mistakes(write_json_file, parts, message):
     path = write_json_file("kit.json", {"format": "kop_exudyn/kit", "version": 1, "parts": parts})
     with pytest.raises(InputError, match=message) as caught:

@@ -1,4 +1,5 @@
 """Result files keep the names that other programs rely on."""
+
 import json
 
 import numpy as np
@@ -6,19 +7,42 @@ import pytest
 
 from kop_exudyn.equilibrium.newton import Equilibrium
 from kop_exudyn.errors import InputError
-from kop_exudyn.io.arrays import load_arrays
+from kop_exudyn.files.arrays import load_arrays
 from kop_exudyn.io.results import load_result, load_states, save_result, save_states
 from kop_exudyn.scene.state import State
 
-SOLVED = {"fit": {"max_percent": 1.0, "mean_percent": 0.5}, "elastic_energy": 2.0, "energy_ratio": 1.1, "stable": True,
-          "exudyn": {"version": "1.13", "newton_steps": 1, "residual": 1e-12, "moved": 1e-12, "wall_s": 0.1}}
+SOLVED = {
+    "fit": {"max_percent": 1.0, "mean_percent": 0.5},
+    "elastic_energy": 2.0,
+    "energy_ratio": 1.1,
+    "stable": True,
+    "exudyn": {
+        "version": "1.13",
+        "newton_steps": 1,
+        "residual": 1e-12,
+        "moved": 1e-12,
+        "wall_s": 0.1,
+    },
+}
 RESULT = {
-    "designs": [{"name": "a", "elements": 9, "direct": {"failed": "buckles"}, "unrelaxed": SOLVED, "relaxed": SOLVED,
-                 "assigned": SOLVED}],
+    "designs": [
+        {
+            "name": "a",
+            "elements": 9,
+            "direct": {"failed": "buckles"},
+            "unrelaxed": SOLVED,
+            "relaxed": SOLVED,
+            "assigned": SOLVED,
+        }
+    ],
     "kit": {"linear": [[1.0, 2.0]], "angular": [0.1]},
     "assignment": [{"kind": "linear", "part": [0, 0], "variant": [1, 0]}],
-    "steps": {"relaxed": 10, "assigned": 5}, "equilibria": 100, "newton_iterations": 400, "wall_s": 12.5,
-    "peak_memory_mb": 300.0, "settings": {"seed": 0},
+    "steps": {"relaxed": 10, "assigned": 5},
+    "equilibria": 100,
+    "newton_iterations": 400,
+    "wall_s": 12.5,
+    "peak_memory_mb": 300.0,
+    "settings": {"seed": 0},
 }
 
 
@@ -29,13 +53,22 @@ def test_names_in_the_file(tmp_path):
     assert load_result(tmp_path / "result.json") == data
 
 
-@pytest.mark.parametrize("change, message", [
-    (lambda r: r.pop("equilibria"), "equilibria: is missing"),
-    (lambda r: r["designs"][0].pop("assigned"), r"designs\[0\].assigned: is missing"),
-    (lambda r: r["designs"][0]["assigned"].pop("exudyn"), r"designs\[0\].assigned.exudyn: is missing"),
-    (lambda r: r["designs"][0]["direct"].update(stable=False), r"designs\[0\].direct.stable: unknown field"),
-    (lambda r: r.update(wall_s=float("nan")), "wall_s: must be a number"),
-])
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        (lambda r: r.pop("equilibria"), "equilibria: is missing"),
+        (lambda r: r["designs"][0].pop("assigned"), r"designs\[0\].assigned: is missing"),
+        (
+            lambda r: r["designs"][0]["assigned"].pop("exudyn"),
+            r"designs\[0\].assigned.exudyn: is missing",
+        ),
+        (
+            lambda r: r["designs"][0]["direct"].update(stable=False),
+            r"designs\[0\].direct.stable: unknown field",
+        ),
+        (lambda r: r.update(wall_s=float("nan")), "wall_s: must be a number"),
+    ],
+)
 def test_an_incomplete_result_is_not_written(tmp_path, change, message):
     result = json.loads(json.dumps(RESULT))
     change(result)
@@ -46,15 +79,20 @@ def test_an_incomplete_result_is_not_written(tmp_path, change, message):
 
 def test_other_formats_are_told_apart(write_json_file):
     with pytest.raises(InputError, match="not a result file"):
-        load_result(write_json_file("kit.json", {"format": "kop_exudyn/kit", "version": 1, "parts": {}}))
+        load_result(
+            write_json_file("kit.json", {"format": "kop_exudyn/kit", "version": 1, "parts": {}})
+        )
 
 
 def test_states_round_trip(tmp_path):
     generator = np.random.default_rng(1)
     state = State(generator.random((3, 3)), generator.random((3, 3, 3)), generator.random(2))
-    equilibrium = Equilibrium(state, generator.random(4), 0.5, 0.25, generator.random((2, 6)), 1.0, 1.0, 3, 1e-12, 0,
-                              0.1)
-    found = load_states(save_states(tmp_path / "states.npz", {("a shape", "assigned", "deployed"): equilibrium}))
+    equilibrium = Equilibrium(
+        state, generator.random(4), 0.5, 0.25, generator.random((2, 6)), 1.0, 1.0, 3, 1e-12, 0, 0.1
+    )
+    found = load_states(
+        save_states(tmp_path / "states.npz", {("a shape", "assigned", "deployed"): equilibrium})
+    )
     arrays = found["a shape", "assigned", "deployed"]
     assert sorted(arrays) == ["angles", "parameters", "positions", "rotations", "torque"]
     for name in ("angles", "positions", "rotations"):

@@ -1,29 +1,38 @@
 """A finished run read back gives the result that was written."""
+
 import json
 
 import numpy as np
 import pytest
 
-from kop_exudyn.analysis.kit_result import STAGES, KitResult
 from kop_exudyn.errors import InputError
-from kop_exudyn.io.arrays import load_arrays, save_arrays
+from kop_exudyn.files.arrays import load_arrays, save_arrays
 from kop_exudyn.io.results import load_result, save_result, save_states
 from kop_exudyn.io.saved_runs import load_run
-from kop_exudyn.optimize.fitting import TargetFitting
-from kop_exudyn.optimize.job import JobSettings, run_job
-from kop_exudyn.optimize.stage_results import Jump
-from kop_exudyn.optimize.stage_settings import StageSettings
 from kop_exudyn.report.kit_drawings import final_states, histories, summary_rows
+from kop_exudyn.search.job import JobSettings, run_job
+from kop_exudyn.search.result import STAGES, KitResult
+from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.stage_results import Jump
+from kop_exudyn.structures.fitting import TargetFitting
 
 
 @pytest.fixture(scope="module")
 def finished(shells, tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
-    stages = StageSettings(schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2)
+    stages = StageSettings(
+        schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2
+    )
     events = []
-    outcome = run_job(shells, {"linear": 3, "angular": 2}, JobSettings(jobs=1, baselines=False, stages=stages),
-                      observer=events.append)
-    result = KitResult(shells, outcome.references, outcome.stages, events, redeployed=outcome.redeployed)
+    outcome = run_job(
+        shells,
+        {"linear": 3, "angular": 2},
+        JobSettings(jobs=1, baselines=False, stages=stages),
+        observer=events.append,
+    )
+    result = KitResult(
+        shells, outcome.references, outcome.stages, events, redeployed=outcome.redeployed
+    )
     result.stages["direct"].jumps.append(Jump(shells[0].name, 0.5, 0.07))
     save_result(folder / "result.json", result.to_dict())
     save_states(folder / "states.npz", final_states(result))
@@ -39,7 +48,10 @@ def test_what_was_written_is_read(finished, shells):
         assert a.fit.max_percent == pytest.approx(b.fit.max_percent, rel=1e-6)
         for role in ("deployed", "rest"):
             scale = np.abs(b.equilibria["deployed"].stress).max(axis=0)
-            assert (np.abs(a.equilibria[role].stress - b.equilibria[role].stress).max(axis=0) <= 1e-6 * scale).all()
+            assert (
+                np.abs(a.equilibria[role].stress - b.equilibria[role].stress).max(axis=0)
+                <= 1e-6 * scale
+            ).all()
     assert again.to_dict()["designs"][0]["assigned"]["exudyn"]["moved"] < 1e-8
 
 
@@ -57,7 +69,9 @@ def test_all_stages_come_back(finished, shells, monkeypatch):
             assert a.value == pytest.approx(b.value, rel=1e-9)
     for a, b in zip(again.references, result.references):
         assert a.energy == pytest.approx(b.energy, rel=1e-9)
-        assert a.equilibria["deployed"].torque == pytest.approx(b.equilibria["deployed"].torque, rel=1e-6)
+        assert a.equilibria["deployed"].torque == pytest.approx(
+            b.equilibria["deployed"].torque, rel=1e-6
+        )
 
 
 def test_snaps_belong_to_their_stages(finished, shells):
@@ -66,7 +80,9 @@ def test_snaps_belong_to_their_stages(finished, shells):
     for stage, found in result.stages.items():
         assert [j.design for j in again.stages[stage].jumps] == [j.design for j in found.jumps]
     last = again.stages["direct"].jumps[-1]
-    assert (last.design, last.fraction) == (shells[0].name, 0.5) and last.distance == pytest.approx(0.07)
+    assert (last.design, last.fraction) == (shells[0].name, 0.5) and last.distance == pytest.approx(
+        0.07
+    )
 
 
 def test_history_and_redeployed_designs_come_back(finished, shells, monkeypatch):
@@ -75,7 +91,10 @@ def test_history_and_redeployed_designs_come_back(finished, shells, monkeypatch)
     for design in shells:
         monkeypatch.setattr(design, "deploy", None)
     again = load_run(folder, shells)
-    assert again.events == result.events and {event.stage for event in again.events} == {"relaxed", "assigned"}
+    assert again.events == result.events and {event.stage for event in again.events} == {
+        "relaxed",
+        "assigned",
+    }
     assert histories(again) == histories(result)
     assert len(again.redeployed) == 2
     for n, (a, b) in enumerate(zip(again.redeployed, result.redeployed)):
@@ -122,10 +141,14 @@ def test_results_tell_how_far_the_inputs_are_off_their_targets(finished, shells)
 
 
 def test_folders_of_earlier_versions(finished, shells, tmp_path):
-    """They have neither parameters nor input states: the last stage is there, the input is simulated again."""
+    """They have neither parameters nor input states: the last stage is there, the input is
+    simulated again."""
     result, folder = finished
-    old = {name: array for name, array in load_arrays(folder / "states.npz").items()
-           if name.split("/")[1] != "input" and name.split("/")[3] not in ("parameters", "torque")}
+    old = {
+        name: array
+        for name, array in load_arrays(folder / "states.npz").items()
+        if name.split("/")[1] != "input" and name.split("/")[3] not in ("parameters", "torque")
+    }
     save_arrays(tmp_path / "states.npz", old)
     data = json.loads((folder / "result.json").read_text())
     for name in ("history", "jumps", "status"):

@@ -1,4 +1,5 @@
 """Study files: everything that a kit is sought with, in one TOML file."""
+
 import json
 from dataclasses import fields
 
@@ -6,10 +7,10 @@ import numpy as np
 import pytest
 
 from kop_exudyn.errors import InputError
-from kop_exudyn.io.designs import load_designs, select_files
+from kop_exudyn.io.datasets import load_designs, select_files
 from kop_exudyn.io.studies import load_study
-from kop_exudyn.optimize.objective import Weights
-from kop_exudyn.optimize.stage_settings import StageSettings
+from kop_exudyn.search.objective import Weights
+from kop_exudyn.search.settings import StageSettings
 
 HEAD = 'format = "kop_exudyn/study"\nversion = 1\n'
 
@@ -38,7 +39,8 @@ def names(files) -> list[str]:
 
 
 def test_everything_that_can_be_said(study):
-    found = load_study(study("""
+    found = load_study(
+        study("""
 designs = ["designs/two.json", {file = "designs/one.json", weight = 2}, "designs/more"]
 baselines = false
 parts = {linear = 12, angular = 5}
@@ -51,8 +53,14 @@ seed = 3
 hessian = "bfgs"
 bounds.linear = {lower = 0.1, upper = [2, 3]}
 bounds.angular = {upper = 1.5}
-"""))
-    assert names(found.files) == ["two", "one", "four", "three"] and found.counts == (1.0, 2.0, 1.0, 1.0)
+""")
+    )
+    assert names(found.files) == ["two", "one", "four", "three"] and found.counts == (
+        1.0,
+        2.0,
+        1.0,
+        1.0,
+    )
     assert found.parts == {"linear": 12, "angular": 5} and found.baselines is False
     settings = found.settings
     assert (settings.schedule, settings.seed, settings.hessian) == ((1000, 1e5), 3, "bfgs")
@@ -62,13 +70,19 @@ bounds.angular = {upper = 1.5}
     designs = found.designs()
     assert [design.name for design in designs] == ["two", "one", "more four", "more three"]
     job = found.job_settings(designs, 2)
-    assert job.weights == Weights(fit=designs[0].fit_weight, energy=0.05, others=(("stress", 0.5),)) and job.design_weights == (1, 2, 1, 1)
+    assert job.weights == Weights(
+        fit=designs[0].fit_weight, energy=0.05, others=(("stress", 0.5),)
+    ) and job.design_weights == (1, 2, 1, 1)
     assert (job.jobs, job.stages) == (2, settings)
 
 
 def test_only_designs(study):
     found = load_study(study('designs = ["designs"]'))
-    assert names(found.files) == ["one", "two"] and not found.parts and found.settings == StageSettings()
+    assert (
+        names(found.files) == ["one", "two"]
+        and not found.parts
+        and found.settings == StageSettings()
+    )
     job = found.job_settings(found.designs(), 1)
     assert job.weights is None and job.design_weights is None
 
@@ -79,47 +93,84 @@ def test_a_folder_is_a_study_with_the_usual_settings(folder):
 
 
 def test_designs_are_picked_with_their_weights(study):
-    path = study('designs = ["designs/two.json", {file = "designs/one.json", weight = 2}, "designs/more"]')
+    path = study(
+        'designs = ["designs/two.json", {file = "designs/one.json", weight = 2}, "designs/more"]'
+    )
     assert load_study(path, ["one", "three"]).counts == (2.0, 1.0)
     assert names(select_files(path, 2)) == ["two", "one"]
     assert [design.name for design in load_designs(path, ["three"])] == ["more three"]
-    with pytest.raises(InputError, match=r"study.toml: designs = 'five': no such design \(there are two, one, four"):
+    with pytest.raises(
+        InputError, match=r"study.toml: designs = 'five': no such design \(there are two, one, four"
+    ):
         load_study(path, ["five"])
 
 
 def test_the_schema_knows_all_settings(repository):
-    schema = json.loads((repository / "kop_exudyn" / "io" / "schemas" / "study.schema.json").read_text())
+    schema = json.loads(
+        (repository / "kop_exudyn" / "io" / "schemas" / "study.schema.json").read_text()
+    )
     known = set(schema["properties"]["settings"]["properties"])
-    assert known == {field.name for field in fields(StageSettings)} - {"constraints"}  # which are written in Python
-    assert set(schema["properties"]["weights"]["properties"]) == {field.name for field in fields(Weights)} - {"others"}
+    # which are written in Python
+    assert known == {field.name for field in fields(StageSettings)} - {"constraints"}
+    assert set(schema["properties"]["weights"]["properties"]) == {
+        field.name for field in fields(Weights)
+    } - {"others"}
 
 
 DESIGNS = 'designs = ["designs"]\n'
 
 
-@pytest.mark.parametrize("text, message", [
-    ("designs = [1 2]", "not TOML: .*line 3"),
-    ("", "designs: is missing"),
-    ("designs = []", r"designs = \[\]: must have at least 1"),
-    ('designs = ["no.json"]', r"designs\[0\] = 'no.json': no such file or folder"),
-    (f'designs = ["{"n" * 300}"]', r"designs\[0\] = 'nnn.*: no such file or folder"),  # too long for a file's name
-    ('designs = ["designs/one.json", "designs"]', r"designs\[1\] = 'one.json': two design files have the same name"),
-    ('designs = [{file = "designs", weigth = 2}]', r"designs\[0\].weigth: unknown field \(did you mean 'weight'\?\)"),
-    ('designs = [{file = "designs", weight = 0}]', r"designs\[0\].weight = 0: must be positive"),
-    (DESIGNS + "part = {linear = 1}", r"part: unknown field \(did you mean 'parts'\?\)"),
-    (DESIGNS + "parts = {linear = 0}", "parts.linear = 0: must be at least 1"),
-    (DESIGNS + "parts = {linear = 1.5}", "parts.linear = 1.5: must be an integer"),
-    (DESIGNS + "[settings]\nsead = 1", r"settings.sead: unknown field \(did you mean 'seed'\?\)"),
-    (DESIGNS + "[settings]\nseed = true", "settings.seed = True: must be an integer"),
-    (DESIGNS + "[settings]\ntight = nan", "settings.tight = nan: is out of range"),
-    (DESIGNS + '[settings]\nhessian = "none"', 'settings.hessian = \'none\': must be one of "exact", "bfgs"'),
-    (DESIGNS + "[settings.bounds]\nlinear = {}", "settings.bounds.linear"),
-    (DESIGNS + "[weights]\nfit = 0\nenergy = 0", "weights = .*: fit and energy can't both be 0"),
-    (DESIGNS + "[weights]\nstrength = 1", r"weights = 'strength': unknown term .*known: fit, energy, stress"),
-    (DESIGNS + "[weights]\nstress = -1", r"weights.stress = -1: must not be negative|weights.stress = -1"),
-    (DESIGNS + "version = 1", "not TOML: Cannot overwrite a value"),
-    ("designs = 2026-01-01", "designs = .*: must be a list"),
-])
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("designs = [1 2]", "not TOML: .*line 3"),
+        ("", "designs: is missing"),
+        ("designs = []", r"designs = \[\]: must have at least 1"),
+        ('designs = ["no.json"]', r"designs\[0\] = 'no.json': no such file or folder"),
+        # too long for a file's name
+        (f'designs = ["{"n" * 300}"]', r"designs\[0\] = 'nnn.*: no such file or folder"),
+        (
+            'designs = ["designs/one.json", "designs"]',
+            r"designs\[1\] = 'one.json': two design files have the same name",
+        ),
+        (
+            'designs = [{file = "designs", weigth = 2}]',
+            r"designs\[0\].weigth: unknown field \(did you mean 'weight'\?\)",
+        ),
+        (
+            'designs = [{file = "designs", weight = 0}]',
+            r"designs\[0\].weight = 0: must be positive",
+        ),
+        (DESIGNS + "part = {linear = 1}", r"part: unknown field \(did you mean 'parts'\?\)"),
+        (DESIGNS + "parts = {linear = 0}", "parts.linear = 0: must be at least 1"),
+        (DESIGNS + "parts = {linear = 1.5}", "parts.linear = 1.5: must be an integer"),
+        (
+            DESIGNS + "[settings]\nsead = 1",
+            r"settings.sead: unknown field \(did you mean 'seed'\?\)",
+        ),
+        (DESIGNS + "[settings]\nseed = true", "settings.seed = True: must be an integer"),
+        (DESIGNS + "[settings]\ntight = nan", "settings.tight = nan: is out of range"),
+        (
+            DESIGNS + '[settings]\nhessian = "none"',
+            'settings.hessian = \'none\': must be one of "exact", "bfgs"',
+        ),
+        (DESIGNS + "[settings.bounds]\nlinear = {}", "settings.bounds.linear"),
+        (
+            DESIGNS + "[weights]\nfit = 0\nenergy = 0",
+            "weights = .*: fit and energy can't both be 0",
+        ),
+        (
+            DESIGNS + "[weights]\nstrength = 1",
+            r"weights = 'strength': unknown term .*known: fit, energy, stress",
+        ),
+        (
+            DESIGNS + "[weights]\nstress = -1",
+            r"weights.stress = -1: must not be negative|weights.stress = -1",
+        ),
+        (DESIGNS + "version = 1", "not TOML: Cannot overwrite a value"),
+        ("designs = 2026-01-01", "designs = .*: must be a list"),
+    ],
+)
 def test_mistakes(text, message, study):
     path = study(text)
     with pytest.raises(InputError, match=message) as caught:
@@ -127,11 +178,17 @@ def test_mistakes(text, message, study):
     assert str(caught.value).startswith(f"{path}: ") and "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("head, message", [
-    ("", r"format = '\(missing\)': not a study file"),
-    ('format = "kop_exudyn/study"\nversion = 2\n', "version = 2: written for a newer kop_exudyn"),
-    ('format = "kop_exudyn/study"\nversion = 0\n', "version = 0: unknown version"),
-])
+@pytest.mark.parametrize(
+    "head, message",
+    [
+        ("", r"format = '\(missing\)': not a study file"),
+        (
+            'format = "kop_exudyn/study"\nversion = 2\n',
+            "version = 2: written for a newer kop_exudyn",
+        ),
+        ('format = "kop_exudyn/study"\nversion = 0\n', "version = 0: unknown version"),
+    ],
+)
 def test_other_versions(head, message, study):
     with pytest.raises(InputError, match=message):
         load_study(study(DESIGNS, head))

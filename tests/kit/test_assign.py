@@ -1,4 +1,5 @@
 """Assignment with a limited stock, against brute force."""
+
 import itertools
 
 import numpy as np
@@ -6,13 +7,16 @@ import pytest
 
 from kop_exudyn.errors import InputError
 from kop_exudyn.kit.assign import assign_with_stock, nearest
+from kop_exudyn.kit.groups import ElementGroup
 from kop_exudyn.kit.parts import Kit
-from kop_exudyn.structures.base import ElementGroup
 
 RNG = np.random.default_rng(5)
 Q = np.concatenate([RNG.uniform(1, 3, 10), RNG.uniform(-1, 1, 4)])
-GROUPS = [ElementGroup("linear", np.arange(8).reshape(4, 2)), ElementGroup("linear", np.array([[8], [9]])),
-          ElementGroup("angular", np.arange(10, 14)[:, None])]
+GROUPS = [
+    ElementGroup("linear", np.arange(8).reshape(4, 2)),
+    ElementGroup("linear", np.array([[8], [9]])),
+    ElementGroup("angular", np.arange(10, 14)[:, None]),
+]
 KIT = Kit({"linear": RNG.uniform(1, 3, (3, 2)), "angular": [0.2, 0.7]})
 
 
@@ -22,7 +26,10 @@ def squared(assignment):
 
 def test_ample_stock_is_the_nearest_assignment():
     free = nearest(GROUPS, Q, KIT)
-    assert assign_with_stock(GROUPS, Q, KIT, {"linear": [6, 6, 6], "angular": [4, 4]}).changes(free) == 0
+    assert (
+        assign_with_stock(GROUPS, Q, KIT, {"linear": [6, 6, 6], "angular": [4, 4]}).changes(free)
+        == 0
+    )
     assert assign_with_stock(GROUPS, Q, KIT, {}).changes(free) == 0
 
 
@@ -44,10 +51,15 @@ def test_scarce_stock_is_used_best():
     assert squared(found) >= squared(nearest(GROUPS, Q, KIT))
 
 
-@pytest.mark.parametrize("counts, message", [
-    ([1, 2, 2], "5 parts for 6 elements"), ([9, 9], "3 whole numbers"), ([9, 9, -1], "negative"),
-    ([9, 9, 0.5], "whole numbers"),
-])
+@pytest.mark.parametrize(
+    "counts, message",
+    [
+        ([1, 2, 2], "5 parts for 6 elements"),
+        ([9, 9], "3 whole numbers"),
+        ([9, 9, -1], "negative"),
+        ([9, 9, 0.5], "whole numbers"),
+    ],
+)
 def test_unusable_stock(counts, message):
     with pytest.raises(InputError, match=message):
         assign_with_stock(GROUPS, Q, KIT, {"linear": counts})

@@ -1,16 +1,18 @@
 """Clustering: against brute force, its invariances, and degenerate inputs."""
+
 import itertools
 import time
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from kop_exudyn.errors import InputError
 from kop_exudyn.kit.assign import nearest
 from kop_exudyn.kit.cluster import best_parts, cluster, lloyd
 from kop_exudyn.kit.elements import collect
-from kop_exudyn.structures.base import ElementGroup
+from kop_exudyn.kit.groups import ElementGroup
 
 
 def linear_problem(n_full, n_end, seed=0, low=1.0, high=3.0):
@@ -22,7 +24,8 @@ def linear_problem(n_full, n_end, seed=0, low=1.0, high=3.0):
 
 
 def brute_force(groups, q, m):
-    """Least energy over every labelling with parts and variants, each with its least-squares parts."""
+    """Least energy over every labelling with parts and variants, each with its least-squares
+    parts."""
     scale = np.median(np.abs(q))
     elements = [(index, group.indices.shape[1]) for group in groups for index in group.indices]
     best = np.inf
@@ -38,19 +41,24 @@ def brute_force(groups, q, m):
     return best
 
 
-@pytest.mark.parametrize("n_full, n_end, m, seed",
-                         [(4, 0, 2, 0), (3, 1, 2, 1), (2, 3, 2, 2), (0, 4, 1, 3), (5, 1, 1, 4)])
+@pytest.mark.parametrize(
+    "n_full, n_end, m, seed", [(4, 0, 2, 0), (3, 1, 2, 1), (2, 3, 2, 2), (0, 4, 1, 3), (5, 1, 1, 4)]
+)
 def test_tiny_problems_reach_the_optimum(n_full, n_end, m, seed):
     groups, q = linear_problem(n_full, n_end, seed)
     groups = [group for group in groups if len(group.indices)]
-    assert cluster(groups, q, {"linear": m}).energy["linear"] == pytest.approx(brute_force(groups, q, m), abs=1e-14)
+    assert cluster(groups, q, {"linear": m}).energy["linear"] == pytest.approx(
+        brute_force(groups, q, m), abs=1e-14
+    )
 
 
 def test_angles_are_clustered_by_magnitude():
     q = np.array([0.1, -0.12, 1.0, -1.1, 1.2])
     found = cluster([ElementGroup("angular", np.arange(5)[:, None])], q, {"angular": 2})
     np.testing.assert_allclose(found.kit["angular"][:, 0], [0.11, 1.1])
-    np.testing.assert_allclose(found.assignment.realise(found.kit, q), [0.11, -0.11, 1.1, -1.1, 1.1])
+    np.testing.assert_allclose(
+        found.assignment.realise(found.kit, q), [0.11, -0.11, 1.1, -1.1, 1.1]
+    )
 
 
 @settings(deadline=None, max_examples=20)
@@ -68,7 +76,9 @@ def test_mirroring_units_and_order_change_nothing(seed, m, unit):
     parts_2, labels_2 = lloyd(changed, unit * start, np.zeros(2), np.full(2, np.inf))
     np.testing.assert_allclose(parts_2, unit * parts, rtol=1e-12)
     np.testing.assert_array_equal(labels_2.part[:8], labels.part[:8][order])
-    assert changed.energy(parts_2, labels_2) == pytest.approx(elements.energy(parts, labels), rel=1e-11)
+    assert changed.energy(parts_2, labels_2) == pytest.approx(
+        elements.energy(parts, labels), rel=1e-11
+    )
 
 
 @settings(deadline=None, max_examples=20)
@@ -77,7 +87,10 @@ def test_sign_of_angles_changes_nothing(seed):
     rng = np.random.default_rng(seed)
     q = rng.uniform(-2, 2, 12)
     groups = [ElementGroup("angular", np.arange(12)[:, None])]
-    one, other = (cluster(groups, values, {"angular": 3}, restarts=2) for values in (q, q * rng.choice([-1, 1], 12)))
+    one, other = (
+        cluster(groups, values, {"angular": 3}, restarts=2)
+        for values in (q, q * rng.choice([-1, 1], 12))
+    )
     np.testing.assert_allclose(one.kit.vector, other.kit.vector, rtol=1e-12)
 
 
@@ -136,7 +149,10 @@ def test_empty_clusters_are_moved_to_the_worst_element():
 
 def test_fewer_distinct_elements_than_parts():
     q = np.array([1.0, 2.0, 2.0, 1.0, 1.0, 2.0, 1.0])  # three mirror images and an end element
-    groups = [ElementGroup("linear", np.arange(6).reshape(3, 2)), ElementGroup("linear", np.array([[6]]))]
+    groups = [
+        ElementGroup("linear", np.arange(6).reshape(3, 2)),
+        ElementGroup("linear", np.array([[6]])),
+    ]
     found = cluster(groups, q, {"linear": 3})
     np.testing.assert_array_equal(found.kit["linear"], [[1, 2]] * 3)
     assert found.energy["linear"] == 0
@@ -158,8 +174,12 @@ def test_groups_of_several_designs_share_the_kit():
 def test_slits_shrink_with_their_cost():
     groups, q = linear_problem(20, 6)
     groups = [ElementGroup("slit", group.indices) for group in groups]
-    slits = [cluster(groups, q, {"slit": 3}, restarts=3, penalties={"slit": (0, 0, cost)}).kit["slit"][:, 2].mean()
-             for cost in (1e-3, 1e-1, 10.0)]
+    slits = [
+        cluster(groups, q, {"slit": 3}, restarts=3, penalties={"slit": (0, 0, cost)})
+        .kit["slit"][:, 2]
+        .mean()
+        for cost in (1e-3, 1e-1, 10.0)
+    ]
     assert slits[0] > slits[1] > slits[2] > 0
     plain = cluster([ElementGroup("linear", group.indices) for group in groups], q, {"linear": 3})
     assert cluster(groups, q, {"slit": 3}).energy["slit"] < plain.energy["linear"]
@@ -168,23 +188,28 @@ def test_slits_shrink_with_their_cost():
 def test_published_size_is_quick():
     rng = np.random.default_rng(0)
     q = np.concatenate([rng.uniform(1, 3, 1440), rng.uniform(-1, 1, 720)])
-    groups = [ElementGroup("linear", np.arange(1260).reshape(-1, 2)),
-              ElementGroup("linear", np.arange(1260, 1440)[:, None]),
-              ElementGroup("angular", np.arange(1440, 2160)[:, None])]
+    groups = [
+        ElementGroup("linear", np.arange(1260).reshape(-1, 2)),
+        ElementGroup("linear", np.arange(1260, 1440)[:, None]),
+        ElementGroup("angular", np.arange(1440, 2160)[:, None]),
+    ]
     cluster(groups, q, {"linear": 2, "angular": 2}, restarts=1)
     start = time.process_time()
     cluster(groups, q, {"linear": 20, "angular": 5}, restarts=20)
     assert time.process_time() - start < 3.0
 
 
-@pytest.mark.parametrize("parts, message", [
-    ({"linear": 6}, "more parts than elements"),
-    ({"linear": 0}, "at least 1"),
-    ({"linear": 2.0}, "whole number"),
-    ({"linear": 2, "angular": 1}, "no elements of this kind"),
-    ({"curved": 1}, "unknown kind"),
-    ({}, "say how many"),
-])
+@pytest.mark.parametrize(
+    "parts, message",
+    [
+        ({"linear": 6}, "more parts than elements"),
+        ({"linear": 0}, "at least 1"),
+        ({"linear": 2.0}, "whole number"),
+        ({"linear": 2, "angular": 1}, "no elements of this kind"),
+        ({"curved": 1}, "unknown kind"),
+        ({}, "say how many"),
+    ],
+)
 def test_impossible_requests(parts, message):
     groups, q = linear_problem(3, 2)
     with pytest.raises(InputError, match=message):

@@ -1,7 +1,9 @@
 """Kinds of parts: what they realise, their canonical forms and bounds."""
+
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import given
+from hypothesis import strategies as st
 
 from kop_exudyn.errors import InputError
 from kop_exudyn.kit.kinds import Variants, kind_names, part_kind
@@ -17,8 +19,10 @@ def test_discovered_kinds():
 def test_canonical_form_realises_the_same_elements(name):
     kind = part_kind(name)
     part = np.arange(kind.n_parameters, 0, -1.0)[None]
-    for size, variants in kind.variants.items():
-        realised, again = (np.einsum("vek,k->ve", variants.matrices, p[0]) for p in (part, kind.canonical(part)))
+    for variants in kind.variants.values():
+        realised, again = (
+            np.einsum("vek,k->ve", variants.matrices, p[0]) for p in (part, kind.canonical(part))
+        )
         assert sorted(map(tuple, realised)) == sorted(map(tuple, again))
         assert len(variants.names) == len(variants.matrices)
     np.testing.assert_array_equal(kind.canonical(kind.canonical(part)), kind.canonical(part))
@@ -53,11 +57,17 @@ def test_slit_part_realises_an_interval(length, slit):
 def test_contact_is_the_linear_form_of_the_residual():
     variants = part_kind("slit").variants_of(2)
     rng = np.random.default_rng(2)
-    elements, parts, variant = rng.uniform(0, 4, (50, 2)), rng.uniform(0, 2, (50, 3)), rng.integers(0, 2, 50)
+    elements, parts, variant = (
+        rng.uniform(0, 4, (50, 2)),
+        rng.uniform(0, 2, (50, 3)),
+        rng.integers(0, 2, 50),
+    )
     rows, active = variants.contact(elements, variant, parts)
     linear = np.where(active, elements - np.einsum("nek,nk->ne", rows, parts), 0)
     rows = np.arange(50)
-    np.testing.assert_allclose(linear, variants.residuals(elements, parts)[rows, rows, variant], atol=1e-14)
+    np.testing.assert_allclose(
+        linear, variants.residuals(elements, parts)[rows, rows, variant], atol=1e-14
+    )
     assert 0 < active.sum() < active.size
 
 

@@ -1,4 +1,5 @@
 """Kits and assignments: order of the parameters, files, and the map from parts to elements."""
+
 import json
 
 import numpy as np
@@ -6,12 +7,15 @@ import pytest
 
 from kop_exudyn.errors import InputError
 from kop_exudyn.kit.assign import nearest
+from kop_exudyn.kit.groups import ElementGroup
 from kop_exudyn.kit.parts import Assignment, Kit
-from kop_exudyn.structures.base import ElementGroup
 
 KIT = Kit({"linear": [[1, 2], [3, 4]], "angular": [0.5, 1.0]})
-GROUPS = [ElementGroup("linear", np.array([[0, 1], [2, 3]])), ElementGroup("linear", np.array([[4]])),
-          ElementGroup("angular", np.array([[6], [5]]))]
+GROUPS = [
+    ElementGroup("linear", np.array([[0, 1], [2, 3]])),
+    ElementGroup("linear", np.array([[4]])),
+    ElementGroup("angular", np.array([[6], [5]])),
+]
 Q = np.array([2.1, 1.1, 3.1, 4.1, 3.9, 0.6, -0.9, 7.0])
 
 
@@ -30,20 +34,23 @@ def test_kit_survives_json():
     np.testing.assert_array_equal(again.vector, KIT.vector)
 
 
-@pytest.mark.parametrize("data, message", [
-    ([], "non-empty object"),
-    ({}, "non-empty object"),
-    ({"curved": [[1]]}, "unknown kind"),
-    ({"linear": [[1, 2], [3]]}, "lists of numbers"),
-    ({"linear": [[1, 2, 3]]}, "2 parameters"),
-    ({"linear": []}, "at least one part"),
-    ({"linear": [["a", 2]]}, "lists of numbers"),
-    ({"linear": [["1", "2"]]}, "lists of numbers"),
-    ({"linear": None}, "lists of numbers"),
-    ({"linear": [[1, float("nan")]]}, r"linear\[0\].*outside"),
-    ({"linear": [[1, 2], [-1, 2]]}, r"linear\[1\].*outside"),
-    ({"angular": [4.0]}, "outside"),
-])
+@pytest.mark.parametrize(
+    "data, message",
+    [
+        ([], "non-empty object"),
+        ({}, "non-empty object"),
+        ({"curved": [[1]]}, "unknown kind"),
+        ({"linear": [[1, 2], [3]]}, "lists of numbers"),
+        ({"linear": [[1, 2, 3]]}, "2 parameters"),
+        ({"linear": []}, "at least one part"),
+        ({"linear": [["a", 2]]}, "lists of numbers"),
+        ({"linear": [["1", "2"]]}, "lists of numbers"),
+        ({"linear": None}, "lists of numbers"),
+        ({"linear": [[1, float("nan")]]}, r"linear\[0\].*outside"),
+        ({"linear": [[1, 2], [-1, 2]]}, r"linear\[1\].*outside"),
+        ({"angular": [4.0]}, "outside"),
+    ],
+)
 def test_malformed_kits(data, message):
     with pytest.raises(InputError, match=message) as caught:
         Kit.from_dict(data, source="kit.json")
@@ -55,7 +62,10 @@ def test_matrix_gives_the_assigned_elements():
     realised = assignment.matrix(KIT) @ KIT.vector
     np.testing.assert_array_equal(realised, [2, 1, 3, 4, 4, 0.5, -1, 0])
     np.testing.assert_array_equal(assignment.realise(KIT, Q), realised + [0, 0, 0, 0, 0, 0, 0, 7])
-    assert {k: v.tolist() for k, v in assignment.pieces(KIT).items()} == {"angular": [1, 1], "linear": [1, 2]}
+    assert {k: v.tolist() for k, v in assignment.pieces(KIT).items()} == {
+        "angular": [1, 1],
+        "linear": [1, 2],
+    }
 
 
 def test_assignment_survives_json_and_is_checked():

@@ -1,19 +1,25 @@
 """Projection energy: value, derivatives and minimisation over parts and assignment."""
+
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from kop_exudyn.kit.cluster import cluster
+from kop_exudyn.kit.groups import ElementGroup
 from kop_exudyn.kit.projection import Projection
-from kop_exudyn.structures.base import ElementGroup
 
 RNG = np.random.default_rng(3)
-Q = np.concatenate([RNG.uniform(1, 3, 40), RNG.uniform(-1, 1, 15), [5.0]])  # the last entry belongs to no element
+# the last entry belongs to no element
+Q = np.concatenate([RNG.uniform(1, 3, 40), RNG.uniform(-1, 1, 15), [5.0]])
 
 
 def groups(kind="linear"):
-    return [ElementGroup(kind, np.arange(30).reshape(15, 2)), ElementGroup(kind, np.arange(30, 40)[:, None]),
-            ElementGroup("angular", np.arange(40, 55)[:, None])]
+    return [
+        ElementGroup(kind, np.arange(30).reshape(15, 2)),
+        ElementGroup(kind, np.arange(30, 40)[:, None]),
+        ElementGroup("angular", np.arange(40, 55)[:, None]),
+    ]
 
 
 @pytest.fixture(params=["linear", "slit"])
@@ -33,11 +39,15 @@ def test_value_by_hand():
     projection = Projection.of_inputs(groups(), Q)
     realised = found.assignment.matrix(found.kit) @ found.kit.vector
     squares = (Q - realised) ** 2
-    by_hand = 0.5 * squares[:40].sum() / 25 / np.median(Q[:40]) ** 2 + 0.5 * squares[40:55].sum() / 15
+    by_hand = (
+        0.5 * squares[:40].sum() / 25 / np.median(Q[:40]) ** 2 + 0.5 * squares[40:55].sum() / 15
+    )
     assert projection.energy(Q, found.kit, found.assignment) == pytest.approx(by_hand, rel=1e-13)
     assert sum(found.energy.values()) == pytest.approx(by_hand, rel=1e-13)
     tightness = projection.tightness(Q, found.kit, found.assignment)
-    assert sum(n * t**2 / n for n, t in zip((25, 15), tightness.values())) == pytest.approx(2 * by_hand, rel=1e-13)
+    assert sum(n * t**2 / n for n, t in zip((25, 15), tightness.values())) == pytest.approx(
+        2 * by_hand, rel=1e-13
+    )
 
 
 def test_minimised_energy_has_the_gradient_and_reduced_hessian(problem):
@@ -68,17 +78,26 @@ def test_gradient_in_the_parts_vanishes_at_the_minimum(problem):
 def test_lifted_hessian_is_exact(problem):
     projection, best = problem
     rng = np.random.default_rng(4)
-    # Away from the minimum, where elements may touch the end of an interval and the energy has no second derivative.
+    # Away from the minimum, where elements may touch the end of an interval and the energy has no
+    # second derivative.
     n_p, assignment = len(best.kit.vector), best.assignment
     kit = best.kit.with_vector(best.kit.vector + rng.uniform(0.01, 0.02, n_p))
     dq, dp = 1e-5 * rng.normal(size=len(Q)), 1e-5 * rng.normal(size=len(kit.vector))
     step, other = np.concatenate([dq, dp]), kit.with_vector(kit.vector + dp)
-    gradient, moved = (np.concatenate([projection.gradient(q, parts, assignment),
-                                       projection.part_gradient(q, parts, assignment)])
-                       for q, parts in ((Q, kit), (Q + dq, other)))
+    gradient, moved = (
+        np.concatenate(
+            [
+                projection.gradient(q, parts, assignment),
+                projection.part_gradient(q, parts, assignment),
+            ]
+        )
+        for q, parts in ((Q, kit), (Q + dq, other))
+    )
     hessian = projection.hessian(Q, kit, assignment).lifted()
     change = projection.energy(Q + dq, other, assignment) - projection.energy(Q, kit, assignment)
-    assert change == pytest.approx(gradient @ step + 0.5 * step @ (hessian @ step), rel=1e-8, abs=1e-14)
+    assert change == pytest.approx(
+        gradient @ step + 0.5 * step @ (hessian @ step), rel=1e-8, abs=1e-14
+    )
     np.testing.assert_allclose(moved - gradient, hessian @ step, atol=1e-12)
 
 
@@ -89,7 +108,9 @@ def test_reduced_hessian_is_identity_minus_mean():
     best = projection.minimise(q, cluster(elements, q, {"angular": 2}).kit)
     signs = np.array([1, -1, 1, 0.0])
     expected = np.diag([1, 1, 1, 0.0]) - np.outer(signs, signs) / 3
-    np.testing.assert_allclose(projection.hessian(q, best.kit, best.assignment).reduced(), expected, atol=1e-14)
+    np.testing.assert_allclose(
+        projection.hessian(q, best.kit, best.assignment).reduced(), expected, atol=1e-14
+    )
 
 
 @settings(deadline=None, max_examples=20)
@@ -135,7 +156,8 @@ def test_empty_groups_are_harmless():
     best = Projection.of_inputs(empty, Q).minimise(Q, found.kit)
     assert best.energy == Projection.of_inputs(groups(), Q).minimise(Q, without.kit).energy
     assert [len(part) for part in best.assignment.part] == [0, 15, 10, 15, 0]
-    np.testing.assert_array_equal(best.assignment.matrix(best.kit).toarray(),
-                                  without.assignment.matrix(without.kit).toarray())
+    np.testing.assert_array_equal(
+        best.assignment.matrix(best.kit).toarray(), without.assignment.matrix(without.kit).toarray()
+    )
     projection = Projection.of_inputs(empty, Q)
     assert set(projection.tightness(Q, best.kit, best.assignment)) == {"linear", "angular"}

@@ -1,4 +1,5 @@
 """Clipped meshes: area, orientation and edge of the part that is left."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,14 +1,15 @@
 """Figures from made-up data: what is drawn is what was given. Their looks were judged by eye."""
+
 import matplotlib
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection, PathCollection
 
+from kop_exudyn.drawing.style import deviation_colours, figure_bytes, save_figure
 from kop_exudyn.errors import InputError
 from kop_exudyn.report.designs import DrawnDesign, DrawnState, draw_designs, project
 from kop_exudyn.report.history import History, HistoryStep, draw_history
 from kop_exudyn.report.parameters import ElementCloud, PartSpace, _spread, draw_parameters
-from kop_exudyn.report.style import deviation_colours, figure_bytes, save_figure
 
 
 def arch(rise: float) -> list[np.ndarray]:
@@ -27,14 +28,19 @@ def text_of(figure) -> str:
 
 
 class TestDesigns:
-    designs = [DrawnDesign("one", [drawn("direct", 0.5, 8.0), drawn("assigned", 0.4, 2.0)], arch(0.4)),
-               DrawnDesign("two", [DrawnState("direct", failed="it buckles"), drawn("assigned", 0.4, 3.0)])]
+    designs = [
+        DrawnDesign("one", [drawn("direct", 0.5, 8.0), drawn("assigned", 0.4, 2.0)], arch(0.4)),
+        DrawnDesign(
+            "two", [DrawnState("direct", failed="it buckles"), drawn("assigned", 0.4, 3.0)]
+        ),
+    ]
 
     def test_rods_joints_and_words(self):
         figure = draw_designs(self.designs)
         panels = figure.axes[:4]
         rods = [c for c in panels[0].collections if isinstance(c, LineCollection)]
-        assert [len(c.get_segments()) for c in rods] == [2, 16]  # wanted shape by rod, drawn state by element
+        # wanted shape by rod, drawn state by element
+        assert [len(c.get_segments()) for c in rods] == [2, 16]
         joints = next(c for c in panels[0].collections if isinstance(c, PathCollection))
         assert sorted(joints.get_array()) == [0.0, 1.0, 8.0]
         words = text_of(figure)
@@ -43,7 +49,12 @@ class TestDesigns:
 
     def test_one_scale_of_colours_for_all(self):
         figure = draw_designs(self.designs)
-        limits = {c.get_clim() for ax in figure.axes[:4] for c in ax.collections if isinstance(c, PathCollection)}
+        limits = {
+            c.get_clim()
+            for ax in figure.axes[:4]
+            for c in ax.collections
+            if isinstance(c, PathCollection)
+        }
         assert limits == {(0.0, 8.0)}
 
     def test_everything_lies_within_its_panel(self):
@@ -51,19 +62,24 @@ class TestDesigns:
         for ax in figure.axes[:4]:
             for lines in (c for c in ax.collections if isinstance(c, LineCollection)):
                 points = np.concatenate(lines.get_segments())
-                assert np.all((points >= [ax.get_xlim()[0], ax.get_ylim()[0]])
-                              & (points <= [ax.get_xlim()[1], ax.get_ylim()[1]]))
+                assert np.all(
+                    (points >= [ax.get_xlim()[0], ax.get_ylim()[0]])
+                    & (points <= [ax.get_xlim()[1], ax.get_ylim()[1]])
+                )
 
     def test_projection_keeps_parallel_lengths_and_looks_from_above(self):
         places, depths = project(np.vstack([np.zeros(3), np.eye(3)]))
-        # three orthonormal directions seen in parallel projection: squared lengths add up to two (Gauss's theorem)
+        # three orthonormal directions seen in parallel projection: squared lengths add up to two
+        # (Gauss's theorem)
         assert np.sum(places[1:] ** 2) == pytest.approx(2)
         assert np.sum(depths[1:] ** 2) == pytest.approx(1)
         assert places[3, 1] > 0 and depths[3] < 0
 
     def test_rows_of_different_states_have_their_titles_in_the_panels(self):
-        rows = [DrawnDesign("", [drawn("a", 1.0, 2.0), drawn("b", 1.0, 2.0)]),
-                DrawnDesign("", [drawn("c", 1.0, 2.0), drawn("d", 1.0, 2.0)])]
+        rows = [
+            DrawnDesign("", [drawn("a", 1.0, 2.0), drawn("b", 1.0, 2.0)]),
+            DrawnDesign("", [drawn("c", 1.0, 2.0), drawn("d", 1.0, 2.0)]),
+        ]
         figure = draw_designs(rows, 1.5, "displacement")
         for title, ax in zip("abcd", figure.axes):
             assert title in [text.get_text() for text in ax.texts] and not ax.get_title()
@@ -76,7 +92,10 @@ class TestDesigns:
 
 
 class TestHistory:
-    steps = [HistoryStep({"fit": 1.0 / k, "projection": 0.5 / k}, 1e3 if k < 4 else 2e4) for k in range(1, 8)]
+    steps = [
+        HistoryStep({"fit": 1.0 / k, "projection": 0.5 / k}, 1e3 if k < 4 else 2e4)
+        for k in range(1, 8)
+    ]
 
     def test_values_are_sums_of_terms(self):
         figure = draw_history([History("relaxed", self.steps)])
@@ -101,9 +120,15 @@ class TestParameters:
     angles = np.random.default_rng(1).uniform(0, 1, (40, 1))
 
     def test_all_elements_and_parts_are_there(self):
-        linear = PartSpace("linear", ("l1", "l2"), self.pairs[:3],
-                           [ElementCloud("inputs", self.pairs, np.array([0.7]))])
-        angular = PartSpace("angular", ("angle",), self.angles[:2], [ElementCloud("inputs", self.angles)])
+        linear = PartSpace(
+            "linear",
+            ("l1", "l2"),
+            self.pairs[:3],
+            [ElementCloud("inputs", self.pairs, np.array([0.7]))],
+        )
+        angular = PartSpace(
+            "angular", ("angle",), self.angles[:2], [ElementCloud("inputs", self.angles)]
+        )
         plane, line = draw_parameters([linear, angular]).axes
         drawn = {entry.get_label(): entry for entry in plane.lines}
         np.testing.assert_array_equal(np.transpose(drawn["inputs"].get_data()), self.pairs)
@@ -114,7 +139,9 @@ class TestParameters:
         assert sorted(t.get_text() for t in line.texts) == ["1", "2"]
 
     def test_identical_parts(self):
-        same = PartSpace("angular", ("angle",), np.ones((3, 1)), [ElementCloud("inputs", np.ones((4, 1)))])
+        same = PartSpace(
+            "angular", ("angle",), np.ones((3, 1)), [ElementCloud("inputs", np.ones((4, 1)))]
+        )
         assert figure_bytes(draw_parameters([same]), "svg")
 
     def test_labels_stand_apart_in_order_and_near_their_places(self):

@@ -1,4 +1,6 @@
-"""The whole job on a toy class with both kinds of parts: zigzags of beams and corners, held a little too short."""
+"""The whole job on a toy class with both kinds of parts: zigzags of beams and corners, held a
+little too short."""
+
 import json
 from functools import cached_property
 
@@ -11,21 +13,23 @@ from kop_exudyn.io.checkpoint import CheckpointStore
 from kop_exudyn.io.kits import load_kit
 from kop_exudyn.io.results import load_result, load_states
 from kop_exudyn.io.saved_runs import load_run
+from kop_exudyn.kit.groups import ElementGroup
 from kop_exudyn.kit.parts import Kit
-from kop_exudyn.optimize.job import JobSettings
-from kop_exudyn.optimize.stage_settings import StageSettings
 from kop_exudyn.report.kit_drawings import drawn_designs, histories, part_spaces
 from kop_exudyn.report.kit_run import optimize_kit
 from kop_exudyn.rods.rotations import rotation_z
 from kop_exudyn.scene.builder import SceneBuilder
-from kop_exudyn.structures.base import Design, ElementGroup, Role, Target
+from kop_exudyn.search.job import JobSettings
+from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.structures.base import Design, Role, Target
 
 STIFFNESS = np.array([1e4, 4e3, 4e3, 0.8, 1.0, 1.0])
 SETTINGS = JobSettings(jobs=1, stages=StageSettings(schedule=(1e3, 1e5), path_steps=4))
 
 
 class Zigzag(Design):
-    """Straight beams with corners of given angles between them, one end clamped, the other pinned too near."""
+    """Straight beams with corners of given angles between them, one end clamped, the other pinned
+    too near."""
 
     class_name = "toy_zigzag"
 
@@ -35,8 +39,10 @@ class Zigzag(Design):
         self.parameters = np.concatenate([lengths.ravel(), angles])
         self.lower = np.concatenate([np.full(2 * self.n, 0.02), np.full(self.n - 1, -3.0)])
         self.upper = np.concatenate([np.full(2 * self.n, np.inf), np.full(self.n - 1, 3.0)])
-        self.groups = [ElementGroup("linear", np.arange(2 * self.n).reshape(-1, 2)),
-                       ElementGroup("angular", np.arange(2 * self.n, 3 * self.n - 1)[:, None])]
+        self.groups = [
+            ElementGroup("linear", np.arange(2 * self.n).reshape(-1, 2)),
+            ElementGroup("angular", np.arange(2 * self.n, 3 * self.n - 1)[:, None]),
+        ]
         self.roles = (Role("deployed", fitted=True),)
         self._scene = self._build(lengths, angles)
 
@@ -44,15 +50,21 @@ class Zigzag(Design):
         builder = SceneBuilder(len(self.parameters))
         turns = np.concatenate([[0], np.cumsum(angles)])
         steps = np.stack([np.cos(turns), np.sin(turns), 0 * turns], axis=1)
-        corners = 0.97 * np.concatenate([[np.zeros(3)], np.cumsum(lengths.sum(axis=1)[:, None] * steps, axis=0)])
+        corners = 0.97 * np.concatenate(
+            [[np.zeros(3)], np.cumsum(lengths.sum(axis=1)[:, None] * steps, axis=0)]
+        )
         middles = corners[:-1] + 0.97 * lengths[:, :1] * steps
         ends = builder.bodies(corners, rotation_z(np.append(turns[:1], turns)))
         self.joints = builder.bodies(middles, rotation_z(turns))
-        hinges = builder.hinges(np.zeros(self.n - 1), parameter=np.arange(2 * self.n, 3 * self.n - 1), prescribed=True)
+        hinges = builder.hinges(
+            np.zeros(self.n - 1), parameter=np.arange(2 * self.n, 3 * self.n - 1), prescribed=True
+        )
         for k in range(self.n):
             turned = -1 if k == 0 else hinges[k - 1]
-            first = builder.nodes(ends[k:k + 1], np.array([turned]))[0]
-            middle, last = (builder.nodes(b)[0] for b in (self.joints[k:k + 1], ends[k + 1:k + 2]))
+            first = builder.nodes(ends[k : k + 1], np.array([turned]))[0]
+            middle, last = (
+                builder.nodes(b)[0] for b in (self.joints[k : k + 1], ends[k + 1 : k + 2])
+            )
             builder.rod([first, middle], STIFFNESS, parameter=2 * k)
             builder.rod([middle, last], STIFFNESS, parameter=2 * k + 1)
         builder.pin(ends[0])
@@ -69,15 +81,20 @@ class Zigzag(Design):
     def target(self):
         joints = self.deploy()["deployed"].state.positions[self.joints]
         strip = np.concatenate([joints + [0, 0, z] for z in (-0.1, 0.1)])
-        faces = [f for k in range(self.n - 1)
-                 for f in ((k, k + 1, self.n + k), (k + 1, self.n + k + 1, self.n + k))]
+        faces = [
+            f
+            for k in range(self.n - 1)
+            for f in ((k, k + 1, self.n + k), (k + 1, self.n + k + 1, self.n + k))
+        ]
         return Target(strip, np.array(faces), joints, float(np.linalg.norm(np.ptp(joints, axis=0))))
 
 
 def zigzags() -> list[Zigzag]:
     generator = np.random.default_rng(5)
-    return [Zigzag(f"zigzag {k}", 0.3 + 0.1 * generator.random((4, 2)), 0.6 * generator.random(3) - 0.3)
-            for k in range(2)]
+    return [
+        Zigzag(f"zigzag {k}", 0.3 + 0.1 * generator.random((4, 2)), 0.6 * generator.random(3) - 0.3)
+        for k in range(2)
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -90,8 +107,19 @@ def finished(tmp_path_factory):
 def test_the_folder_holds_all_that_is_promised(finished):
     result, out = finished
     names = {path.name for path in out.iterdir()}
-    figures = {f"{name}.{suffix}" for name in ("designs", "history", "parameters") for suffix in ("svg", "png")}
-    assert names == figures | {"result.json", "kit.json", "states.npz", "viewer.html", "index.html", "checkpoints"}
+    figures = {
+        f"{name}.{suffix}"
+        for name in ("designs", "history", "parameters")
+        for suffix in ("svg", "png")
+    }
+    assert names == figures | {
+        "result.json",
+        "kit.json",
+        "states.npz",
+        "viewer.html",
+        "index.html",
+        "checkpoints",
+    }
     np.testing.assert_array_equal(load_kit(out / "kit.json").vector, result.kit.vector)
     state = load_states(out / "states.npz")["zigzag 1", "assigned", "deployed"]
     kept = result.stages["assigned"].designs[1].equilibria["deployed"].state
@@ -107,7 +135,10 @@ def test_result_file(finished):
     assert data["settings"]["parts"] == {"linear": 3, "angular": 2}
     assert data["peak_memory_mb"] > 0
     strength = data["designs"][0]["assigned"]["strength"]
-    assert strength == {"deployed": {"equivalent_stress": None, "utilisation": None, "element": None}}  # no sections
+    # no sections
+    assert strength == {
+        "deployed": {"equivalent_stress": None, "utilisation": None, "element": None}
+    }
 
 
 def test_drawings_show_the_result(finished):
@@ -130,7 +161,13 @@ def test_drawings_show_the_result(finished):
 
 def test_the_page_names_designs_and_settings(finished):
     page = (finished[1] / "index.html").read_text(encoding="utf-8")
-    for piece in ("One kit of parts for 2 designs", "zigzag 1", "2 angular", "relaxed_steps", "exudyn"):
+    for piece in (
+        "One kit of parts for 2 designs",
+        "zigzag 1",
+        "2 angular",
+        "relaxed_steps",
+        "exudyn",
+    ):
         assert piece in page
 
 
@@ -154,38 +191,63 @@ def test_killed_and_resumed_gives_the_same(finished, tmp_path, monkeypatch):
     resumed = optimize_kit(zigzags(), {"linear": 3, "angular": 2}, resume=True, **arguments)
     np.testing.assert_array_equal(resumed.kit.vector, result.kit.vector)
     volatile = {"wall_s", "peak_memory_mb", "exudyn", "seconds"}
-    first, second = (json.loads((folder / "result.json").read_text(), object_pairs_hook=lambda pairs: {
-        key: value for key, value in pairs if key not in volatile}) for folder in (out, tmp_path / "out"))
+    first, second = (
+        json.loads(
+            (folder / "result.json").read_text(),
+            object_pairs_hook=lambda pairs: {
+                key: value for key, value in pairs if key not in volatile
+            },
+        )
+        for folder in (out, tmp_path / "out")
+    )
     assert first == second
 
 
 def test_designs_from_a_kit_that_exists(finished, tmp_path):
     """The parts stay as they are; the page and the saved run know of it."""
     kit = load_kit(finished[1] / "kit.json")
-    result = optimize_kit(zigzags()[:1], kit.sizes, out=tmp_path / "out", settings=SETTINGS, kit=kit)
+    result = optimize_kit(
+        zigzags()[:1], kit.sizes, out=tmp_path / "out", settings=SETTINGS, kit=kit
+    )
     np.testing.assert_array_equal(result.kit.vector, kit.vector)
     evaluation = result.stages["assigned"].designs[0]
     assert "unrelaxed" not in result.stages and evaluation.confirmations
-    np.testing.assert_array_equal(result.stages["assigned"].assignment.realise(kit, evaluation.q), evaluation.q)
-    assert "<h1>An existing kit for a design</h1>" in (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    np.testing.assert_array_equal(
+        result.stages["assigned"].assignment.realise(kit, evaluation.q), evaluation.q
+    )
+    assert "<h1>An existing kit for a design</h1>" in (tmp_path / "out" / "index.html").read_text(
+        encoding="utf-8"
+    )
     data = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
     assert data["settings"]["kit"] == kit.to_dict() and data["kit"] == kit.to_dict()
     assert load_run(tmp_path / "out", zigzags()[:1]).kit.to_dict() == kit.to_dict()
-    with pytest.raises(InputError, match="kit = 'linear': the kit has no angular parts, which zigzag 0 is made of"):
-        optimize_kit(zigzags()[:1], {"linear": 3}, out=tmp_path / "no", kit=Kit({"linear": kit["linear"]}))
+    with pytest.raises(
+        InputError, match="kit = 'linear': the kit has no angular parts, which zigzag 0 is made of"
+    ):
+        optimize_kit(
+            zigzags()[:1], {"linear": 3}, out=tmp_path / "no", kit=Kit({"linear": kit["linear"]})
+        )
     assert not (tmp_path / "no").exists()
 
 
 def test_another_job_is_not_resumed(finished):
     with pytest.raises(InputError, match="different job: parts.linear was 3 and is now 4"):
-        optimize_kit(zigzags(), {"linear": 4, "angular": 2}, out=finished[1], settings=SETTINGS, resume=True)
+        optimize_kit(
+            zigzags(), {"linear": 4, "angular": 2}, out=finished[1], settings=SETTINGS, resume=True
+        )
 
 
-@pytest.mark.parametrize("parts, message", [
-    ({"linear": 9, "angular": 2}, r"parts.linear = 9: more parts than elements \(8\)"),
-    ({"linear": 3}, "parts.angular: the designs have elements of this kind"),
-    ({"linear": 3, "angular": 2, "cell": 1}, "parts.cell = 1: the designs have no elements of this kind"),
-])
+@pytest.mark.parametrize(
+    "parts, message",
+    [
+        ({"linear": 9, "angular": 2}, r"parts.linear = 9: more parts than elements \(8\)"),
+        ({"linear": 3}, "parts.angular: the designs have elements of this kind"),
+        (
+            {"linear": 3, "angular": 2, "cell": 1},
+            "parts.cell = 1: the designs have no elements of this kind",
+        ),
+    ],
+)
 def test_impossible_requests_fail_before_anything_is_written(tmp_path, parts, message):
     with pytest.raises(InputError, match=message):
         optimize_kit(zigzags(), parts, out=tmp_path / "out", settings=SETTINGS)
@@ -194,8 +256,8 @@ def test_impossible_requests_fail_before_anything_is_written(tmp_path, parts, me
 
 def test_memory_counts_live_workers(c_shell_data):
     """Workers live on after a run and are no ended children: their memory would go unseen."""
-    from kop_exudyn.memory import peak_memory_mb
-    from kop_exudyn.optimize.pool import DesignPool
+    from kop_exudyn.search.memory import peak_memory_mb
+    from kop_exudyn.search.pool import DesignPool
     from kop_exudyn.structures.base import design_from_dict
 
     designs = [design_from_dict(c_shell_data | {"name": name}, name) for name in "ab"]

@@ -1,4 +1,5 @@
 """The page is one file that shows what it was given and loads nothing."""
+
 import base64
 import re
 import socket
@@ -45,14 +46,27 @@ def page() -> Page:
     figure.subplots().plot([0, 1])
     page = Page("Kit of 12 parts", "One <kit> & three designs.")
     page.section("Designs", "First.\n\nSecond.")
-    page.table(["name", "max %", "stable"], [["a<b", 1.23456, True], ["c", None, False]], "Deviations.")
-    page.figure(figure, "A line.", alt='a "line"').figure(figure, "Again.", alt="pixels", suffix="png")
+    page.table(
+        ["name", "max %", "stable"], [["a<b", 1.23456, True], ["c", None, False]], "Deviations."
+    )
+    page.figure(figure, "A line.", alt='a "line"').figure(
+        figure, "Again.", alt="pixels", suffix="png"
+    )
     return page.details("Settings", {"seed": 0, "note": "</pre>"}).footer("Took 3 s.")
 
 
 def test_well_formed_and_complete(page):
     text = parsed(page).text
-    for piece in ("Kit of 12 parts", "One <kit> & three designs.", "a<b", "1.235", "–", "yes", "</pre>", "Took 3 s."):
+    for piece in (
+        "Kit of 12 parts",
+        "One <kit> & three designs.",
+        "a<b",
+        "1.235",
+        "–",
+        "yes",
+        "</pre>",
+        "Took 3 s.",
+    ):
         assert piece in text
 
 
@@ -74,9 +88,17 @@ def test_saving(page, tmp_path):
     assert path.read_text(encoding="utf-8") == page.html()
 
 
-@pytest.mark.parametrize("value, text", [
-    (None, "–"), (True, "yes"), (12345, "12,345"), (0.000123456, "0.0001235"), ("x", "x"), (2.0, "2"),
-])
+@pytest.mark.parametrize(
+    "value, text",
+    [
+        (None, "–"),
+        (True, "yes"),
+        (12345, "12,345"),
+        (0.000123456, "0.0001235"),
+        ("x", "x"),
+        (2.0, "2"),
+    ],
+)
 def test_values(value, text):
     assert shown(value) == text
 

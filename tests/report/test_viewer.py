@@ -1,4 +1,5 @@
 """The 3D page: its data in Python; and, where Chromium is installed, what a browser makes of it."""
+
 import base64
 import hashlib
 import json
@@ -11,24 +12,42 @@ from html import unescape
 import numpy as np
 import pytest
 
-from kop_exudyn.analysis.kit_result import KitResult
-from kop_exudyn.io.designs import load_designs
-from kop_exudyn.optimize.job import JobSettings, run_job
-from kop_exudyn.optimize.stage_settings import StageSettings
+from kop_exudyn.io.datasets import load_designs
 from kop_exudyn.report.viewer import (
-    ViewerDesign, ViewerPart, ViewerRods, ViewerScene, ViewerState, save_viewer, scene_data, viewer_page)
+    ViewerDesign,
+    ViewerPart,
+    ViewerRods,
+    ViewerScene,
+    ViewerState,
+    save_viewer,
+    scene_data,
+    viewer_page,
+)
 from kop_exudyn.report.viewer_scenes import design_scene, kit_scene, opening_path
+from kop_exudyn.search.job import JobSettings, run_job
+from kop_exudyn.search.result import KitResult
+from kop_exudyn.search.settings import StageSettings
 from kop_exudyn.structures.base import design_from_dict
 
 SECTION = np.array([[0.1, 0.1], [-0.1, 0.1], [-0.1, -0.1], [0.1, -0.1]])
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+CHROMIUM = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
 
 
 def two_rods(stage="input", opening=None, final=True, utilisation=0.5):
     """Two rods of two and three rings, one beside the other."""
     x = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.5, 1, 0], [1, 1, 0]], float)
-    return ViewerState(stage, "deployed", x, np.broadcast_to(np.eye(3), (5, 3, 3)), deviation=np.linspace(0, 1.9, 5),
-                       utilisation=np.full(5, utilisation), opening=opening, final=final)
+    return ViewerState(
+        stage,
+        "deployed",
+        x,
+        np.broadcast_to(np.eye(3), (5, 3, 3)),
+        deviation=np.linspace(0, 1.9, 5),
+        utilisation=np.full(5, utilisation),
+        opening=opening,
+        final=final,
+    )
 
 
 def rods():
@@ -36,28 +55,50 @@ def rods():
 
 
 def plain_scene(**changes):
-    parts = [ViewerPart("L1", "linear", (0.8, 0.2, 0.1), "l1 1", (1, 1)), ViewerPart("L2", "linear", (0.1, 0.3, 0.8))]
-    designs = [ViewerDesign(name, {"deployed": rods()}, [two_rods(), two_rods("assigned")],
-                            (np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]]), np.array([[0, 1, 2]])))
-               for name in ("one", "two </script><b>")]
+    parts = [
+        ViewerPart("L1", "linear", (0.8, 0.2, 0.1), "l1 1", (1, 1)),
+        ViewerPart("L2", "linear", (0.1, 0.3, 0.8)),
+    ]
+    designs = [
+        ViewerDesign(
+            name,
+            {"deployed": rods()},
+            [two_rods(), two_rods("assigned")],
+            (np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]]), np.array([[0, 1, 2]])),
+        )
+        for name in ("one", "two </script><b>")
+    ]
     return ViewerScene("A <test> page", designs, parts, **changes)
 
 
 def shell(name, bow):
     along = [[[-1.2, y - bow], [0, y], [1.2, y - 0.1]] for y in (-0.5, 0.4)]
     across = [[[x, -0.9], [x * 1.1 + bow / 5, 0], [x, 0.9]] for x in (-0.8, 0.05, 0.7)]
-    return design_from_dict({
-        "class": "c_shell", "name": name, "opening": {"angle": 0.3}, "crossings": "find", "free_ends": False,
-        "material": {"young": 2.1e9, "poisson": 0.35, "elastic_limit": 4e7},
-        "section": {"type": "rectangle", "width": 0.03, "height": 0.004},
-        "curves": [{"type": "spline", "points": points, "closed": False} for points in along + across]})
+    return design_from_dict(
+        {
+            "class": "c_shell",
+            "name": name,
+            "opening": {"angle": 0.3},
+            "crossings": "find",
+            "free_ends": False,
+            "material": {"young": 2.1e9, "poisson": 0.35, "elastic_limit": 4e7},
+            "section": {"type": "rectangle", "width": 0.03, "height": 0.004},
+            "curves": [
+                {"type": "spline", "points": points, "closed": False} for points in along + across
+            ],
+        }
+    )
 
 
 @pytest.fixture(scope="module")
 def result():
     designs = [shell("flat", 0.1), shell("bent", 0.16)]
-    stages = StageSettings(schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2)
-    outcome = run_job(designs, {"linear": 2, "angular": 2}, JobSettings(jobs=1, baselines=False, stages=stages))
+    stages = StageSettings(
+        schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2
+    )
+    outcome = run_job(
+        designs, {"linear": 2, "angular": 2}, JobSettings(jobs=1, baselines=False, stages=stages)
+    )
     return KitResult(designs, outcome.references, outcome.stages)
 
 
@@ -67,17 +108,21 @@ def kit_page(result):
 
 
 def decoded(packed):
-    (kind, text), = packed.items()
+    ((kind, text),) = packed.items()
     return np.frombuffer(base64.b64decode(text), {"f32": "<f4", "i32": "<i4"}[kind])
 
 
 def data_on(page):
-    return json.loads(re.search(r'<script type="application/json" id="scene">(.*?)</script>', page, re.S).group(1))
+    return json.loads(
+        re.search(r'<script type="application/json" id="scene">(.*?)</script>', page, re.S).group(1)
+    )
 
 
 def test_page_is_one_file_that_loads_nothing():
     page = viewer_page(plain_scene())
-    assert not re.search(r"(src|href)\s*=|url\(|@import|https?://|import\s*\(|fetch\(|XMLHttpRequest", page)
+    assert not re.search(
+        r"(src|href)\s*=|url\(|@import|https?://|import\s*\(|fetch\(|XMLHttpRequest", page
+    )
     script = re.search(r"<script>(.*?)</script>", page, re.S).group(1)
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     assert f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'" in page
@@ -109,7 +154,9 @@ def test_kit_scene_has_all_stages_and_parts(result, kit_page):
     for n, design in enumerate(kit_page.designs):
         final = [s for s in design.states if s.final]
         stages = ("input", "direct", "relaxed", "assigned")
-        assert {(s.stage, s.role) for s in final} == {(stage, role) for stage in stages for role in ("deployed", "rest")}
+        assert {(s.stage, s.role) for s in final} == {
+            (stage, role) for stage in stages for role in ("deployed", "rest")
+        }
         scene, rods = result.designs[n].scene("deployed"), design.rods["deployed"]
         assert rods.rings.sum() == sum(len(chain.nodes) for chain in scene.chains)
         counts = np.bincount(rods.corner_parts, minlength=4)[:2]
@@ -117,7 +164,9 @@ def test_kit_scene_has_all_stages_and_parts(result, kit_page):
         assigned = next(s for s in final if (s.stage, s.role) == ("assigned", "deployed"))
         outcome = result.stages["assigned"].designs[n]
         assert f"max {outcome.fit.max_percent:.2g} %" in assigned.note
-        wanted = outcome.fit.placement.apply(outcome.equilibria["deployed"].state.positions[result.designs[n].joints])
+        wanted = outcome.fit.placement.apply(
+            outcome.equilibria["deployed"].state.positions[result.designs[n].joints]
+        )
         np.testing.assert_allclose(assigned.joints, wanted, atol=1e-6)
 
 
@@ -144,11 +193,15 @@ def test_opening_path_closes_step_by_step(result, kit_page):
 def test_a_single_design_without_parts(result):
     scene = design_scene(result.designs[0], result.references[0].equilibria)
     data = scene_data(scene)
-    assert data["parts"] == [] and "part" not in data["colourings"] and "utilisation" in data["colourings"]
+    assert (
+        data["parts"] == []
+        and "part" not in data["colourings"]
+        and "utilisation" in data["colourings"]
+    )
     assert (decoded(data["designs"][0]["rods"]["deployed"]["part"]) == -1).all()
 
 
-# -- in a browser -----------------------------------------------------------------------------------------------------
+# -- in a browser ------------------------------------------------------------------------------
 browser = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
 
 
@@ -156,18 +209,35 @@ def run_chromium(page, tmp_path, *options, budget=3000):
     """budget : ms of the page's own time, which goes by at once; None: real time."""
     limit = [] if budget is None else [f"--virtual-time-budget={budget}"]
     return subprocess.run(
-        [CHROMIUM, "--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
-         "--enable-unsafe-swiftshader", "--disable-background-networking", "--window-size=900,600",
-         f"--user-data-dir={tmp_path / 'profile'}", *limit, *options, page],
-        capture_output=True, text=True, timeout=120)
+        [
+            CHROMIUM,
+            "--headless",
+            "--no-sandbox",
+            "--use-gl=angle",
+            "--use-angle=swiftshader",
+            "--enable-unsafe-swiftshader",
+            "--disable-background-networking",
+            "--window-size=900,600",
+            f"--user-data-dir={tmp_path / 'profile'}",
+            *limit,
+            *options,
+            page,
+        ],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
 
 
 @browser
 def test_page_draws_in_chromium(kit_page, tmp_path):
     path = save_viewer(tmp_path / "view.html", kit_page)
     assert path.stat().st_size < 2e6
-    done = run_chromium(f"{path.as_uri()}#design=0&stage=assigned&role=deployed&colour=part&target=0", tmp_path,
-                        "--dump-dom")
+    done = run_chromium(
+        f"{path.as_uri()}#design=0&stage=assigned&role=deployed&colour=part&target=0",
+        tmp_path,
+        "--dump-dom",
+    )
     assert 'data-ready="1"' in done.stdout and "data-failed" not in done.stdout
     assert "Content Security Policy" not in done.stderr
     for piece in ("<b>flat</b>", ">L2</button>", "angular parts"):
@@ -182,7 +252,11 @@ def test_picture_has_the_parts_colours(kit_page, tmp_path):
     path = save_viewer(tmp_path / "view.html", kit_page)
     pictures = {}
     for view in ("part=L1&colour=part", "colour=deviation"):
-        run_chromium(f"{path.as_uri()}#design=0&target=0&{view}", tmp_path, f"--screenshot={tmp_path / 'view.png'}")
+        run_chromium(
+            f"{path.as_uri()}#design=0&target=0&{view}",
+            tmp_path,
+            f"--screenshot={tmp_path / 'view.png'}",
+        )
         pictures[view] = imread(tmp_path / "view.png")[60:, 300:, :3].reshape(-1, 3)
     for view, pixels in pictures.items():
         drawn = pixels[np.ptp(pixels, axis=1) > 0.25]
@@ -209,9 +283,12 @@ def test_a_click_highlights_the_part(kit_page, tmp_path):
         if (part) found.add(part + "/" + (pressed ? pressed.textContent : "none"));
       }
       document.body.dataset.found = [...found].sort().join(" ");
-    }, 300));</script>"""
-    page = re.sub(r"<meta http-equiv=.*?>", "", viewer_page(kit_page)).replace("</body>", clicks + "</body>")
-    page = page.replace("canvas.setPointerCapture(e.pointerId);", "")  # only real pointers can be captured
+    }, 300));</script>"""  # noqa: E501  # a command on one line can be copied
+    page = re.sub(r"<meta http-equiv=.*?>", "", viewer_page(kit_page)).replace(
+        "</body>", clicks + "</body>"
+    )
+    # only real pointers can be captured
+    page = page.replace("canvas.setPointerCapture(e.pointerId);", "")
     path = tmp_path / "clicked.html"
     path.write_text(page, encoding="utf-8")
     for _ in range(3):  # on a busy machine the browser may be asked before its first frame is drawn
@@ -236,13 +313,18 @@ def test_the_slider_opens_the_designs(kit_page, tmp_path):
       }
       document.body.dataset.found = JSON.stringify(found);
     }, 300));</script>"""
-    page = re.sub(r"<meta http-equiv=.*?>", "", viewer_page(kit_page)).replace("</body>", moves + "</body>")
+    page = re.sub(r"<meta http-equiv=.*?>", "", viewer_page(kit_page)).replace(
+        "</body>", moves + "</body>"
+    )
     path = tmp_path / "moved.html"
     path.write_text(page, encoding="utf-8")
     done = run_chromium(f"{path.as_uri()}#design=0&role=deployed", tmp_path, "--dump-dom")
     found = json.loads(unescape(re.search(r'data-found="([^"]*)"', done.stdout).group(1)))
-    openings = [state.opening for state in kit_page.designs[0].states
-                if (state.stage, state.role) == ("assigned", "deployed")]
+    openings = [
+        state.opening
+        for state in kit_page.designs[0].states
+        if (state.stage, state.role) == ("assigned", "deployed")
+    ]
     first, last = np.degrees(openings[-1]), np.degrees(openings[0])
     shown = [float(text.rstrip("°")) for text, _ in found]
     assert shown == pytest.approx([first, first + 0.25 * (last - first), last], abs=0.06)
@@ -257,8 +339,11 @@ def test_pictures_follow_the_slider(kit_page, tmp_path):
     path = save_viewer(tmp_path / "view.html", kit_page)
     covered = []
     for opening in ("0", "1"):
-        run_chromium(f"{path.as_uri()}#design=0&role=deployed&target=0&opening={opening}", tmp_path,
-                     f"--screenshot={tmp_path / 'view.png'}")
+        run_chromium(
+            f"{path.as_uri()}#design=0&role=deployed&target=0&opening={opening}",
+            tmp_path,
+            f"--screenshot={tmp_path / 'view.png'}",
+        )
         pixels = imread(tmp_path / "view.png")[60:, 300:, :3]
         covered.append(np.ptp(pixels, axis=2) > 0.25)
     assert min(c.sum() for c in covered) > 300
@@ -267,12 +352,18 @@ def test_pictures_follow_the_slider(kit_page, tmp_path):
 
 @browser
 def test_five_designs_of_full_size_load_in_three_seconds(repository, tmp_path):
-    """As a run of five C-shells leaves them: five stages, eight states on the way to the opening."""
+    """As a run of five C-shells leaves them: five stages, eight states on the way to the
+    opening."""
     designs = []
     for design in load_designs(repository / "models" / "conformals", 5):
         drawn = design_scene(design, design.deploy(), frames=8).designs[0]
         stages = ViewerScene("", ()).stages
-        states = [replace(s, stage=stage) for stage in stages for s in drawn.states if s.final or stage == stages[-1]]
+        states = [
+            replace(s, stage=stage)
+            for stage in stages
+            for s in drawn.states
+            if s.final or stage == stages[-1]
+        ]
         designs.append(replace(drawn, states=states))
     path = save_viewer(tmp_path / "five.html", ViewerScene("Five designs", designs))
     assert 3e6 < path.stat().st_size < 1e7

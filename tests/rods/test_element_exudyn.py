@@ -1,4 +1,5 @@
 """The element against Exudyn's own residual of the same two-node system."""
+
 from __future__ import annotations
 
 import exudyn as exu
@@ -6,12 +7,17 @@ import exudyn.itemInterface as item
 import numpy as np
 import pytest
 
-from kop_exudyn.rods import element, element_numpy
+from kop_exudyn.rods import element
 from kop_exudyn.rods.rotations import exp_se3, exp_so3, log_so3
+from support import element_numpy
 
 K = np.array([300.0, 20.0, 15.0, 0.4, 0.5, 0.6])
 L = 0.8
-CURVATURES = {"straight": [0.0, 0.0, 0.0], "pre-curved": [0.3, -0.5, 0.8], "nearly straight": [1e-7, 0.0, -2e-7]}
+CURVATURES = {
+    "straight": [0.0, 0.0, 0.0],
+    "pre-curved": [0.3, -0.5, 0.8],
+    "nearly straight": [1e-7, 0.0, -2e-7],
+}
 
 
 class TwoNodes:
@@ -22,12 +28,16 @@ class TwoNodes:
         self._mbs = mbs = self._container.AddSystem()
         p, R = exp_se3(L * gamma)
         self._reference = np.concatenate([np.zeros(6), p, log_so3(R)])
-        nodes = [mbs.AddNode(item.NodeRigidBodyRotVecLG(referenceCoordinates=half.tolist()))
-                 for half in self._reference.reshape(2, 6)]
+        nodes = [
+            mbs.AddNode(item.NodeRigidBodyRotVecLG(referenceCoordinates=half.tolist()))
+            for half in self._reference.reshape(2, 6)
+        ]
         section = exu.BeamSection()
         section.stiffnessMatrix = np.diag(K)
         section.inertia, section.massPerLength = np.eye(3), 1.0
-        mbs.AddObject(item.ObjectBeamGeometricallyExact(nodeNumbers=nodes, length=L, sectionData=section))
+        mbs.AddObject(
+            item.ObjectBeamGeometricallyExact(nodeNumbers=nodes, length=L, sectionData=section)
+        )
         mbs.Assemble()
         self._settings = exu.SimulationSettings()
         self._settings.solution.file.write = False
@@ -48,7 +58,9 @@ def test_gradient_is_minus_exudyns_residual(curvature):
     gamma = np.array([1.0, 0, 0, *curvature])
     beam = TwoNodes(gamma)
     rng = np.random.default_rng(3)
-    angles = np.concatenate([[0.0, 1e-12, 1e-8, 1e-5, 0.4999999, 0.5, 0.5000001], rng.uniform(0, 3, 30), [3.0]])
+    angles = np.concatenate(
+        [[0.0, 1e-12, 1e-8, 1e-5, 0.4999999, 0.5, 0.5000001], rng.uniform(0, 3, 30), [3.0]]
+    )
     for angle in angles:
         axis = rng.normal(size=3)
         R0 = exp_so3(rng.normal(size=3))

@@ -1,4 +1,5 @@
 """Kernels on disk that were compiled with an older version of what they call."""
+
 import os
 import subprocess
 import sys
@@ -9,7 +10,10 @@ import pytest
 from kop_exudyn.rods.kernel_cache import drop_stale_kernels
 
 CALLED = "import numba as nb\n\n\n@nb.njit(cache=True)\ndef called(x):\n    return {} * x\n"
-CALLER = "import numba as nb\nfrom called import called\n\n\n@nb.njit(cache=True)\ndef caller(x):\n    return called(x) + 1.0\n"
+CALLER = (
+    "import numba as nb\nfrom called import called\n\n\n"
+    "@nb.njit(cache=True)\ndef caller(x):\n    return called(x) + 1.0\n"
+)
 
 
 @pytest.fixture
@@ -21,8 +25,14 @@ def package(tmp_path):
 
 
 def result(package) -> float:
-    done = subprocess.run([sys.executable, "-c", "from caller import caller; print(caller(3.0))"], cwd=package,
-                          capture_output=True, text=True, check=True, env=os.environ | {"PYTHONPATH": str(package)})
+    done = subprocess.run(
+        [sys.executable, "-c", "from caller import caller; print(caller(3.0))"],
+        cwd=package,
+        capture_output=True,
+        text=True,
+        check=True,
+        env=os.environ | {"PYTHONPATH": str(package)},
+    )
     return float(done.stdout)
 
 
@@ -42,6 +52,7 @@ def test_files_without_kernels_and_times_to_come(package):
     later = time.time() + 3600
     os.utime(package / "other.py", (later, later))
     assert drop_stale_kernels(package) == 0
-    os.utime(package / "called.py", (later, later))  # a clock that was wrong: dropped once more, nothing worse
+    # a clock that was wrong: dropped once more, nothing worse
+    os.utime(package / "called.py", (later, later))
     assert drop_stale_kernels(package) > 0
     assert result(package) == 7.0

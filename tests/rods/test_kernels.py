@@ -1,4 +1,5 @@
 """How kernels are compiled."""
+
 import sys
 
 import numba as nb

@@ -2,14 +2,22 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from scipy.special import bernoulli, factorial
 
-from kop_exudyn.rods import element_numpy
 from kop_exudyn.rods.rotations import (
-    axes_along_z, bend_coefficient, compose_increments, exp_se3, exp_so3, hat, log_so3, rotation_z,
+    axes_along_z,
+    bend_coefficient,
+    compose_increments,
+    exp_se3,
+    exp_so3,
+    hat,
+    log_so3,
+    rotation_z,
 )
+from support import element_numpy
 
 
 def unit_vectors(seed: int, n: int) -> np.ndarray:
@@ -30,7 +38,9 @@ def test_exponential_is_scipys(angle):
 def test_logarithm_undoes_the_exponential(angle):
     w = angle * np.concatenate([unit_vectors(2, 50), np.eye(3), -np.eye(3)])
     assert np.allclose(log_so3(exp_so3(w)), w, rtol=0, atol=1e-15 + 3e-15 * angle)
-    assert np.allclose(element_numpy.rotation_vectors(exp_so3(w)), w, rtol=0, atol=1e-15 + 3e-15 * angle)
+    assert np.allclose(
+        element_numpy.rotation_vectors(exp_so3(w)), w, rtol=0, atol=1e-15 + 3e-15 * angle
+    )
 
 
 def test_logarithm_of_half_turns_has_length_pi():
@@ -44,12 +54,16 @@ def test_logarithm_of_half_turns_has_length_pi():
 @settings(max_examples=60, deadline=None)
 @given(t=st.one_of(st.floats(0, 1e-3), st.floats(0.4, 0.6), st.floats(0, 3.1)))
 def test_bend_coefficient_and_derivatives_against_the_full_series(t):
-    """c = sum |B_2k| s^(k-1)/(2k)!: only positive terms, sixty of them, so nothing is lost below t = pi."""
+    """c = sum |B_2k| s^(k-1)/(2k)!: only positive terms, sixty of them, so nothing is lost below t
+    = pi."""
     s = t * t
     k = np.arange(1, 61)
     b = np.abs(bernoulli(120)[2 * k]) / factorial(2 * k)
-    exact = (np.sum(b * s ** (k - 1.0)), np.sum((b * (k - 1))[1:] * s ** (k[1:] - 2.0)),
-             np.sum((b * (k - 1) * (k - 2))[2:] * s ** (k[2:] - 3.0)))
+    exact = (
+        np.sum(b * s ** (k - 1.0)),
+        np.sum((b * (k - 1))[1:] * s ** (k[1:] - 2.0)),
+        np.sum((b * (k - 1) * (k - 2))[2:] * s ** (k[2:] - 3.0)),
+    )
     values = bend_coefficient(s)
     plain = [float(v[0]) for v in element_numpy.bend_coefficients(np.array([s]))]
     for c in (values, plain):
@@ -59,7 +73,8 @@ def test_bend_coefficient_and_derivatives_against_the_full_series(t):
 
 
 def test_rigid_motion_exponential_inverts_the_relative_motion():
-    """u = A(phi) p, with A from its definition: the inverse of the left Jacobian, a power series of matrices."""
+    """u = A(phi) p, with A from its definition: the inverse of the left Jacobian, a power series of
+    matrices."""
     rng = np.random.default_rng(4)
     h = rng.normal(size=(20, 6))
     p, R = exp_se3(h)

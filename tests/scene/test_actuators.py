@@ -2,7 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from kop_exudyn.errors import InputError
 from kop_exudyn.rods.rotations import exp_so3
@@ -47,7 +48,9 @@ def test_gradient_and_hessian_are_those_of_the_energy(options, seed):
     remainders = []
     for step in (1e-2, 5e-3):
         change = term.energy(state.moved(step * direction)) - energy
-        remainders.append(change - step * gradient @ direction - 0.5 * step**2 * direction @ hessian @ direction)
+        remainders.append(
+            change - step * gradient @ direction - 0.5 * step**2 * direction @ hessian @ direction
+        )
     third = 8 * abs(remainders[1])
     scale = np.sum(np.abs(term.energies(state)))
     assert abs(remainders[0]) < max(1.6 * third, 1e-4 * scale)

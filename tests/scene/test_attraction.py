@@ -2,12 +2,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from kop_exudyn.errors import InputError
+from kop_exudyn.geometry.triangles import TriangleSurface
 from kop_exudyn.scene.attraction import Attraction
 from kop_exudyn.scene.state import State
-from kop_exudyn.scene.surface import TriangleSurface
 
 BODIES = np.array([[0, 1], [2, 3], [4, 1]])
 
@@ -25,8 +26,13 @@ def roof() -> TriangleSurface:
 
 
 def make(roof: TriangleSurface, **options) -> Attraction:
-    fields = dict(shares=[0.25, 0.75], targets=np.arange(9.0).reshape(3, 3) / 9, target_weight=[1.0, 2.0, 0.0],
-                  surface=roof, surface_weight=[0.5, 1.0, 3.0])
+    fields = dict(
+        shares=[0.25, 0.75],
+        targets=np.arange(9.0).reshape(3, 3) / 9,
+        target_weight=[1.0, 2.0, 0.0],
+        surface=roof,
+        surface_weight=[0.5, 1.0, 3.0],
+    )
     return Attraction(BODIES, **{**fields, **options})
 
 
@@ -48,12 +54,17 @@ def test_energy_is_quadratic_while_the_closest_feature_stays(roof, seed, frozen)
     assert energy == pytest.approx(term.energy(state), rel=1e-12)
     direction = np.random.default_rng(seed).normal(size=36)
     moved = state.moved(1e-6 * direction)
-    same = np.array_equal(roof.closest(term.queries(state)).faces, roof.closest(term.queries(moved)).faces)
+    same = np.array_equal(
+        roof.closest(term.queries(state)).faces, roof.closest(term.queries(moved)).faces
+    )
     if frozen or same:
         change = assembled(term, moved)[1] - gradient
         assert np.allclose(change / 1e-6, hessian @ direction, atol=1e-7)
         assert term.energy(moved) - energy == pytest.approx(
-            1e-6 * gradient @ direction + 0.5e-12 * direction @ hessian @ direction, rel=1e-7, abs=1e-14)
+            1e-6 * gradient @ direction + 0.5e-12 * direction @ hessian @ direction,
+            rel=1e-7,
+            abs=1e-14,
+        )
 
 
 def test_frozen_and_live_agree_at_the_state_of_freezing(roof):
@@ -83,11 +94,17 @@ def test_single_bodies_and_no_surface_search_without_weight():
     assert term.energy(state) == pytest.approx(0.5 * np.sum(state.positions[[0, 5]] ** 2))
 
 
-@pytest.mark.parametrize("options, field", [
-    (dict(targets=None), "target_weight"), (dict(surface=None), "surface_weight"),
-    (dict(target_weight=[1.0, -1.0, 0.0]), "target_weight"), (dict(surface_weight=[1.0, 2.0]), "surface_weight"),
-    (dict(targets=[[0, 0, 0]]), "targets"), (dict(points=np.full((3, 3), np.nan)), "points"),
-])
+@pytest.mark.parametrize(
+    "options, field",
+    [
+        (dict(targets=None), "target_weight"),
+        (dict(surface=None), "surface_weight"),
+        (dict(target_weight=[1.0, -1.0, 0.0]), "target_weight"),
+        (dict(surface_weight=[1.0, 2.0]), "surface_weight"),
+        (dict(targets=[[0, 0, 0]]), "targets"),
+        (dict(points=np.full((3, 3), np.nan)), "points"),
+    ],
+)
 def test_wrong_input_is_named(roof, options, field):
     with pytest.raises(InputError, match=field):
         make(roof, **options)

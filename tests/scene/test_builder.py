@@ -76,7 +76,9 @@ def test_hinges_turn_about_their_own_axis_and_centre():
     assert np.allclose(x[0], [1 + 2, 2 + 1, 3 + 5])
     assert np.allclose(R[0], [[1, 0, 0], [0, 0, -1], [0, 1, 0]])
     arms, rates = scene.node_arms(scene.initial)
-    assert np.allclose(arms[0], [2, 1, 5]) and np.allclose(rates[0], [0, -5, 0]) and not rates[1].any()
+    assert (
+        np.allclose(arms[0], [2, 1, 5]) and np.allclose(rates[0], [0, -5, 0]) and not rates[1].any()
+    )
 
 
 def test_prescriptions_follow_the_parameters():
@@ -111,15 +113,18 @@ def test_size_and_length_scale_come_from_the_nodes():
     assert np.allclose(scene.polylines(scene.initial)[0], np.arange(9.0).reshape(3, 3))
 
 
-@pytest.mark.parametrize("spoil", [
-    lambda b: b.rod([0], K, length=1.0),
-    lambda b: b.rod([0, 0], K, length=1.0),  # one body at both ends
-    lambda b: b.rod([0, 1], K, parameter=3),
-    lambda b: b.hinges([0.0], parameter=7, prescribed=True),
-    lambda b: b.hinges([0.0, 0.0], axis=[[0, 0, 1], [0, 0, 0]]),
-    lambda b: b.hinges([0.0], axis=[0, np.nan, 1]),
-    lambda b: b.prescribe(1, 0, parameter=3),
-])
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda b: b.rod([0], K, length=1.0),
+        lambda b: b.rod([0, 0], K, length=1.0),  # one body at both ends
+        lambda b: b.rod([0, 1], K, parameter=3),
+        lambda b: b.hinges([0.0], parameter=7, prescribed=True),
+        lambda b: b.hinges([0.0, 0.0], axis=[[0, 0, 1], [0, 0, 0]]),
+        lambda b: b.hinges([0.0], axis=[0, np.nan, 1]),
+        lambda b: b.prescribe(1, 0, parameter=3),
+    ],
+)
 def test_pieces_that_do_not_fit(spoil):
     builder = two_rods()
     with pytest.raises(InputError):

@@ -2,13 +2,21 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from kop_exudyn.errors import InputError
 from kop_exudyn.rods.rotations import exp_so3
 from kop_exudyn.rods.sections import rectangle
 from kop_exudyn.scene.builder import SceneBuilder
-from kop_exudyn.scene.loads import BodyMoments, DeadForces, HingeTorques, Scaled, SpatialMoments, with_self_weight
+from kop_exudyn.scene.loads import (
+    BodyMoments,
+    DeadForces,
+    HingeTorques,
+    Scaled,
+    SpatialMoments,
+    with_self_weight,
+)
 from kop_exudyn.scene.state import State
 
 
@@ -32,9 +40,11 @@ def test_potentials_against_differences(seed):
     rng = np.random.default_rng(seed)
     state = random_state(seed)
     d = rng.normal(size=34)
-    for term in (DeadForces([3, 0, 3], rng.normal(size=(3, 3)), rng.normal(size=(3, 3))),
-                 HingeTorques([1, 3], rng.normal(size=2), 5),
-                 Scaled(DeadForces([1], rng.normal(size=3), [1.0, 2, 3]), -2.5)):
+    for term in (
+        DeadForces([3, 0, 3], rng.normal(size=(3, 3)), rng.normal(size=(3, 3))),
+        HingeTorques([1, 3], rng.normal(size=2), 5),
+        Scaled(DeadForces([1], rng.normal(size=3), [1.0, 2, 3]), -2.5),
+    ):
         energy, g, H = assembled(term, state)
         assert energy == pytest.approx(term.energy(state), rel=1e-13)
         h = 1e-4
@@ -49,7 +59,9 @@ def test_dead_force_at_a_point_does_the_work_of_its_path():
     force, point = np.array([1.0, -2, 3]), np.array([0.3, 0.1, -0.2])
     term = DeadForces([2], force, point)
     moved = state.moved(np.arange(34) / 20)
-    path = (moved.positions[2] + moved.rotations[2] @ point) - (state.positions[2] + state.rotations[2] @ point)
+    path = (moved.positions[2] + moved.rotations[2] @ point) - (
+        state.positions[2] + state.rotations[2] @ point
+    )
     assert term.energy(state) - term.energy(moved) == pytest.approx(force @ path)
 
 
@@ -58,7 +70,7 @@ def test_moments_do_the_work_of_small_turns():
     moment = np.array([0.5, 1.5, -1.0])
     w = np.array([0.2, -0.1, 0.4])
     d = np.zeros(34)
-    d[6 * 4 + 3: 6 * 4 + 6] = w
+    d[6 * 4 + 3 : 6 * 4 + 6] = w
     fixed, space = BodyMoments([4], moment), SpatialMoments([4], moment)
     assert -assembled(fixed, state)[1] @ d == pytest.approx(moment @ w)
     assert -assembled(space, state)[1] @ d == pytest.approx(moment @ (state.rotations[4] @ w))
@@ -67,7 +79,8 @@ def test_moments_do_the_work_of_small_turns():
 
 @pytest.mark.parametrize("kind", [BodyMoments, SpatialMoments])
 def test_the_symmetric_tangent_of_a_moment_vanishes(kind):
-    """The work along R exp(t hat(w)) has no second derivative at t = 0; the skew rest of the tangent does."""
+    """The work along R exp(t hat(w)) has no second derivative at t = 0; the skew rest of the
+    tangent does."""
     state, moment = random_state(3), np.array([0.5, 1.5, -1.0])
     term = kind([4], moment)
     h = 1e-5
@@ -98,19 +111,22 @@ def test_self_weight_is_added_per_rest_length():
     assert np.allclose(again.weight[:, 2], [-2.943, -5.886])
 
 
-@pytest.mark.parametrize("make", [
-    lambda: DeadForces([0, 1], np.zeros((3, 3))),
-    lambda: DeadForces([0], [np.nan, 0, 0]),
-    lambda: DeadForces([0], [0, 0, 1.0], points=[0.0, 1.0]),
-    lambda: SpatialMoments([0], [[1.0, 2.0]]),
-    lambda: HingeTorques([0, 1], [1.0, 2.0, 3.0], 5),
-    lambda: HingeTorques([0], np.inf, 5),
-    lambda: with_self_weight(beam(), 1.0, [0, 0, -1]),
-    lambda: with_self_weight(beam(), -1.0, [0, 0, -1], areas=1.0),
-    lambda: with_self_weight(beam(), 1.0, [0, 0, -1], areas=[1.0, 0.0]),
-    lambda: with_self_weight(beam(), 1.0, [0, 0, -1, 2], areas=1.0),
-    lambda: with_self_weight(beam(), 1.0, [0, np.nan, -1], areas=1.0),
-])
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: DeadForces([0, 1], np.zeros((3, 3))),
+        lambda: DeadForces([0], [np.nan, 0, 0]),
+        lambda: DeadForces([0], [0, 0, 1.0], points=[0.0, 1.0]),
+        lambda: SpatialMoments([0], [[1.0, 2.0]]),
+        lambda: HingeTorques([0, 1], [1.0, 2.0, 3.0], 5),
+        lambda: HingeTorques([0], np.inf, 5),
+        lambda: with_self_weight(beam(), 1.0, [0, 0, -1]),
+        lambda: with_self_weight(beam(), -1.0, [0, 0, -1], areas=1.0),
+        lambda: with_self_weight(beam(), 1.0, [0, 0, -1], areas=[1.0, 0.0]),
+        lambda: with_self_weight(beam(), 1.0, [0, 0, -1, 2], areas=1.0),
+        lambda: with_self_weight(beam(), 1.0, [0, np.nan, -1], areas=1.0),
+    ],
+)
 def test_bad_loads(make):
     with pytest.raises(InputError):
         make()

@@ -1,14 +1,17 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from kop_exudyn.rods.rotations import exp_so3
 from kop_exudyn.scene.state import State
 
 
 def random_state(rng, bodies=4, hinges=3) -> State:
-    return State(rng.normal(size=(bodies, 3)), exp_so3(rng.normal(size=(bodies, 3))), rng.normal(size=hinges))
+    return State(
+        rng.normal(size=(bodies, 3)), exp_so3(rng.normal(size=(bodies, 3))), rng.normal(size=hinges)
+    )
 
 
 @settings(max_examples=30, deadline=None)
@@ -36,6 +39,8 @@ def test_rigid_motion_and_arrays():
     Q, t = exp_so3(rng.normal(size=3)), rng.normal(size=3)
     there = state.transformed(Q, t)
     assert np.allclose(there.transformed(Q.T, -Q.T @ t).positions, state.positions)
-    assert np.allclose(np.linalg.norm(there.positions[0] - there.positions[1]),
-                       np.linalg.norm(state.positions[0] - state.positions[1]))
+    assert np.allclose(
+        np.linalg.norm(there.positions[0] - there.positions[1]),
+        np.linalg.norm(state.positions[0] - state.positions[1]),
+    )
     assert np.array_equal(State(**state.to_arrays()).rotations, state.rotations)

@@ -1,4 +1,5 @@
 """Rods of the classical problems."""
+
 from __future__ import annotations
 
 from types import SimpleNamespace
@@ -23,11 +24,23 @@ def axes_along(tangent, normal) -> np.ndarray:
     return np.column_stack([x, y, np.cross(x, y)])
 
 
-def add_rod(builder: SceneBuilder, n: int, start, axes, length: float, stiffness, *, first=None, strain=None,
-            rest_strain=None) -> np.ndarray:
-    """Add a rod of n elements from a point, along constant strain (default straight); returns its bodies (n + 1,).
+def add_rod(
+    builder: SceneBuilder,
+    n: int,
+    start,
+    axes,
+    length: float,
+    stiffness,
+    *,
+    first=None,
+    strain=None,
+    rest_strain=None,
+) -> np.ndarray:
+    """Add a rod of n elements from a point, along constant strain (default straight); returns its
+    bodies (n + 1,).
 
-    first : body to start from; strain : (6,) in which it is placed; rest_strain : (6,) in which it is unstressed
+    first : body to start from; strain : (6,) in which it is placed; rest_strain : (6,) in which it
+        is unstressed
     """
     strain = np.array([1.0, 0, 0, 0, 0, 0]) if strain is None else np.asarray(strain, float)
     s = np.linspace(0, length, n + 1)
@@ -39,13 +52,16 @@ def add_rod(builder: SceneBuilder, n: int, start, axes, length: float, stiffness
     else:
         bodies = np.concatenate([[first], builder.bodies(x[1:], R[1:])])
         there = np.concatenate(builder._rotations)[first]
-        nodes = np.concatenate([builder.nodes([first], frame=there.T @ axes), builder.nodes(bodies[1:])])
+        nodes = np.concatenate(
+            [builder.nodes([first], frame=there.T @ axes), builder.nodes(bodies[1:])]
+        )
     builder.rod(nodes, stiffness, length=length, rest_strain=rest_strain)
     return bodies
 
 
 def hold_plane(builder: SceneBuilder, bodies, normal: int) -> None:
-    """Take a plane's out-of-plane freedoms from bodies that have the normal (1: y, 2: z) among their own axes."""
+    """Take a plane's out-of-plane freedoms from bodies that have the normal (1: y, 2: z) among
+    their own axes."""
     others = [k for k in range(3) if k != normal]
     for body in bodies:
         builder.pin(body, (normal, *(3 + k for k in others)))
@@ -63,14 +79,30 @@ def equilibrium(scene, start=None, confirm=True):
 
 @pytest.fixture(scope="session")
 def rods():
-    return SimpleNamespace(axes_along=axes_along, add=add_rod, hold_plane=hold_plane, equilibrium=equilibrium, none=NONE)
+    return SimpleNamespace(
+        axes_along=axes_along,
+        add=add_rod,
+        hold_plane=hold_plane,
+        equilibrium=equilibrium,
+        none=NONE,
+    )
 
 
 @pytest.fixture
 def classical(record_property):
-    """Tells studies/stress.py what a classical case compared: the case, its source, rod elements, and two numbers."""
+    """Tells studies/stress.py what a classical case compared: the case, its source, rod elements,
+    and two numbers."""
+
     def record(case: str, source: str, elements: int, reference: float, found: float) -> None:
-        record_property("classical", {"case": case, "source": source, "elements": elements, "reference": float(reference),
-                                      "found": float(found)})
+        record_property(
+            "classical",
+            {
+                "case": case,
+                "source": source,
+                "elements": elements,
+                "reference": float(reference),
+                "found": float(found),
+            },
+        )
 
     return record

@@ -1,8 +1,11 @@
-"""At and beyond a bifurcation: the side is the one asked for, no saddle comes back, derivatives say what they're worth.
+"""At and beyond a bifurcation: the side is the one asked for, no saddle comes back, derivatives say
+what they're worth.
 
-The pitchfork is that of a straight column between fixed points, which two weak springs from either side hold at its
-middle. Shortening one spring pulls the middle sideways by an amount that grows as 1 / (distance to the bifurcation).
+The pitchfork is that of a straight column between fixed points, which two weak springs from either
+side hold at its middle. Shortening one spring pulls the middle sideways by an amount that grows as
+1 / (distance to the bifurcation).
 """
+
 from __future__ import annotations
 
 import json
@@ -64,7 +67,8 @@ def before(distance: float) -> np.ndarray:
 
 
 def test_the_load_is_eulers():
-    """The springs carry 1 / 0.3 each: of a column's P = pi^2 EI / L^2, (2 / 0.3) (2 L / pi^2) more, by Rayleigh."""
+    """The springs carry 1 / 0.3 each: of a column's P = pi^2 EI / L^2, (2 / 0.3) (2 L / pi^2) more,
+    by Rayleigh."""
     shortening = 1 - 1 / critical_length()
     assert shortening * COLUMN[0] == pytest.approx(np.pi**2 + 2 / SPRING * 2 / np.pi**2, rel=0.01)
 
@@ -78,14 +82,19 @@ def test_taylor_up_to_the_bifurcation(distance):
     assert sensitivities.trusted
     slope = sensitivities.positions(np.array([middle]))[1, 1]
     step = np.array([0.0, 1e-5 * distance**1.5, 0.0])
-    ahead, back = (refine(system, solve(system, q + s * step, equilibrium)).state.positions[middle, 1] for s in (1, -1))
+    ahead, back = (
+        refine(system, solve(system, q + s * step, equilibrium)).state.positions[middle, 1]
+        for s in (1, -1)
+    )
     assert slope == pytest.approx((ahead - back) / (2 * step[1]), rel=1e-5)
 
 
 def test_slopes_grow_with_the_inverse_distance():
     system, middle = column()
-    slopes = [Sensitivities(system, solve(system, before(d))).positions(np.array([middle]))[1, 1] * d
-              for d in (1e-3, 1e-4, 1e-5)]
+    slopes = [
+        Sensitivities(system, solve(system, before(d))).positions(np.array([middle]))[1, 1] * d
+        for d in (1e-3, 1e-4, 1e-5)
+    ]
     np.testing.assert_allclose(slopes, slopes[0], rtol=1e-2)
 
 
@@ -111,16 +120,23 @@ def test_the_side_is_the_chosen_one():
     q = q_of(1.01)
     side = np.zeros(system.scene.n_dofs)
     side[6 * middle + 1] = 1.0
-    up, down = (solve(system, q, options=NewtonOptions(side=sign * side[system.sparsity.free])) for sign in (1, -1))
+    up, down = (
+        solve(system, q, options=NewtonOptions(side=sign * side[system.sparsity.free]))
+        for sign in (1, -1)
+    )
     assert up.state.positions[middle, 1] > 0.05
     rod = slice(0, ELEMENTS + 1)
-    np.testing.assert_allclose(up.state.positions[rod] * [1, -1, 1], down.state.positions[rod], atol=1e-8)
+    np.testing.assert_allclose(
+        up.state.positions[rod] * [1, -1, 1], down.state.positions[rod], atol=1e-8
+    )
     again = solve(system, q, options=NewtonOptions(side=side[system.sparsity.free]))
     np.testing.assert_array_equal(again.state.positions, up.state.positions)
 
 
 def test_c_shells_up_and_down_are_mirror_images(repository):
-    data = json.loads((repository / "models" / "conformals" / "01_sinh.json").read_text(encoding="utf-8"))
+    data = json.loads(
+        (repository / "models" / "conformals" / "01_sinh.json").read_text(encoding="utf-8")
+    )
     states = {}
     for side in ("up", "down"):
         design = design_from_dict(data | {"opening": data["opening"] | {"side": side}})

@@ -1,7 +1,9 @@
-"""Damaged files of every kind: read, or refused in one line, soon and in bounded memory; no pickle is ever loaded.
+"""Damaged files of every kind: read, or refused in one line, soon and in bounded memory; no pickle
+is ever loaded.
 
 studies/stress.py reads a hundred thousand of them.
 """
+
 from __future__ import annotations
 
 import io
@@ -10,18 +12,20 @@ import zipfile
 import numpy as np
 import pytest
 
-from kop_exudyn.io.stress.corpus import corpus
-from kop_exudyn.io.stress.fuzz import READERS, fuzz
-from kop_exudyn.io.stress.mutations import Tripwire, mutate, pickled_array
 from kop_exudyn.errors import InputError
-from kop_exudyn.io.arrays import load_arrays
+from kop_exudyn.files.arrays import load_arrays
 from kop_exudyn.io.designs import load_design
-from kop_exudyn.optimize.history import SQPState
 from kop_exudyn.rods.sections import rectangle
+from kop_exudyn.sqp.history import SQPState
+from lib.stress.corpus import corpus
+from lib.stress.fuzz import READERS, fuzz
+from lib.stress.mutations import Tripwire, mutate, pickled_array
 
 # the reader of mesh files, trimesh, casts whatever it finds
-pytestmark = pytest.mark.filterwarnings("ignore:invalid value encountered in cast:RuntimeWarning",
-                                        "ignore:overflow encountered:RuntimeWarning")
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:invalid value encountered in cast:RuntimeWarning",
+    "ignore:overflow encountered:RuntimeWarning",
+)
 
 
 def test_two_thousand_damaged_files(tmp_path):
@@ -64,8 +68,12 @@ def test_hangs_and_hunger_are_noticed(tmp_path, monkeypatch):
     calls = iter([lambda path: None])
     monkeypatch.setitem(READERS, "job", lambda path: next(calls, hang)(path))
     states = iter([lambda path: None])
-    monkeypatch.setitem(READERS, "states", lambda path: next(states, lambda path: bytearray(2**31))(path))
-    kinds = {finding.kind for finding in fuzz(range(40), tmp_path, seconds=0.02, megabytes=256).findings}
+    monkeypatch.setitem(
+        READERS, "states", lambda path: next(states, lambda path: bytearray(2**31))(path)
+    )
+    kinds = {
+        finding.kind for finding in fuzz(range(40), tmp_path, seconds=0.02, megabytes=256).findings
+    }
     assert kinds == {"hang", "MemoryError"}
 
 
@@ -89,19 +97,29 @@ class TestArrays:
             load_arrays(archive(tmp_path, pickled_array()))
         assert not Tripwire.sprung
 
-    @pytest.mark.parametrize("header", [
-        "{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999,), }",  # 745 GiB were allocated
-        "{'descr': '<f8', 'fortran_order': False, 'shape': (",
-        "{'descr': '<f8', 'fortran_order': False, 'shape': (True,), }",
-        "{'descr': '<f8', 'fortran_order': False, 'shape': (-1,), }",
-        "{'descr': '|V8', 'fortran_order': 3, 'shape': (1,), }", "", "{" * 50,
-    ])
+    @pytest.mark.parametrize(
+        "header",
+        [
+            # 745 GiB were allocated
+            "{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999,), }",
+            "{'descr': '<f8', 'fortran_order': False, 'shape': (",
+            "{'descr': '<f8', 'fortran_order': False, 'shape': (True,), }",
+            "{'descr': '<f8', 'fortran_order': False, 'shape': (-1,), }",
+            "{'descr': '|V8', 'fortran_order': 3, 'shape': (1,), }",
+            "",
+            "{" * 50,
+        ],
+    )
     def test_headers_that_lie(self, tmp_path, header):
-        with pytest.raises(InputError, match=r"^[^\n]*x\.npz: not a readable file of arrays: [^\n]*$"):
+        with pytest.raises(
+            InputError, match=r"^[^\n]*x\.npz: not a readable file of arrays: [^\n]*$"
+        ):
             load_arrays(archive(tmp_path, npy(header, b"12345678")))
 
     def test_an_encrypted_archive(self, tmp_path):
-        path = archive(tmp_path, npy("{'descr': '<f8', 'fortran_order': False, 'shape': (1,), }", b"12345678"))
+        path = archive(
+            tmp_path, npy("{'descr': '<f8', 'fortran_order': False, 'shape': (1,), }", b"12345678")
+        )
         content = bytearray(path.read_bytes())
         for mark, offset in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
             content[content.find(mark) + offset] |= 1
@@ -110,23 +128,42 @@ class TestArrays:
             load_arrays(path)
 
 
-@pytest.mark.parametrize("arrays", [
-    {}, {"numbers": np.array(3.0)}, {"numbers": np.zeros(4)}, {"numbers": np.zeros(5), "history": np.array("{")},
-    {"numbers": np.zeros(5), "history": np.array('[{"step": 1}]'), "x": np.zeros(1)},
-    {"numbers": np.zeros(5), "history": np.array("[]"), "x": np.zeros(1)},
-])
+@pytest.mark.parametrize(
+    "arrays",
+    [
+        {},
+        {"numbers": np.array(3.0)},
+        {"numbers": np.zeros(4)},
+        {"numbers": np.zeros(5), "history": np.array("{")},
+        {"numbers": np.zeros(5), "history": np.array('[{"step": 1}]'), "x": np.zeros(1)},
+        {"numbers": np.zeros(5), "history": np.array("[]"), "x": np.zeros(1)},
+    ],
+)
 def test_states_of_something_else(arrays):
     with pytest.raises(InputError, match="not the state of an optimisation"):
         SQPState.from_arrays(arrays)
 
 
 class TestDesigns:
-    @pytest.mark.parametrize("path, value, message", [
-        (("section", "width"), 1e300, "section.width = 1e+300: is out of range"),
-        (("curves", 0, "points", 1, 0), 10**400, "points[1][0] = 'an integer of 401 digits': is out of range"),
-        (("curves", 0, "points", 1, 0), -1e300, "curves[0].points[1][0] = -1e+300: is out of range"),
-    ])
-    def test_numbers_whose_powers_are_no_numbers(self, c_shell_data, write_json_file, path, value, message):
+    @pytest.mark.parametrize(
+        "path, value, message",
+        [
+            (("section", "width"), 1e300, "section.width = 1e+300: is out of range"),
+            (
+                ("curves", 0, "points", 1, 0),
+                10**400,
+                "points[1][0] = 'an integer of 401 digits': is out of range",
+            ),
+            (
+                ("curves", 0, "points", 1, 0),
+                -1e300,
+                "curves[0].points[1][0] = -1e+300: is out of range",
+            ),
+        ],
+    )
+    def test_numbers_whose_powers_are_no_numbers(
+        self, c_shell_data, write_json_file, path, value, message
+    ):
         place = c_shell_data
         for step in path[:-1]:
             place = place[step]

@@ -1,4 +1,6 @@
-"""Interrupted at any moment and resumed, a job gives what it would have given undisturbed, bit for bit."""
+"""Interrupted at any moment and resumed, a job gives what it would have given undisturbed, bit for
+bit."""
+
 from __future__ import annotations
 
 import errno
@@ -7,16 +9,16 @@ import os
 import numpy as np
 import pytest
 
-from kop_exudyn.io.stress import kills
-from kop_exudyn.analysis.stress.arch import arches
-from kop_exudyn.analysis.stress.interruption import FailingStore, MemoryStore, fingerprint, resumed_at
 from kop_exudyn.errors import InputError
-from kop_exudyn.io import files
-from kop_exudyn.io.arrays import load_arrays
-from kop_exudyn.optimize import pool
-from kop_exudyn.optimize.job import JobSettings, run_job
-from kop_exudyn.optimize.stage_settings import StageSettings
+from kop_exudyn.files import files
+from kop_exudyn.files.arrays import load_arrays
 from kop_exudyn.report.kit_run import optimize_kit
+from kop_exudyn.search import pool
+from kop_exudyn.search.job import JobSettings, run_job
+from kop_exudyn.search.settings import StageSettings
+from lib.stress import kills
+from lib.stress.arch import arches
+from lib.stress.interruption import FailingStore, MemoryStore, fingerprint, resumed_at
 
 PARTS = {"linear": 2}
 SETTINGS = JobSettings(jobs=1, stages=StageSettings(schedule=(1e3, 1e5)))
@@ -28,7 +30,11 @@ def undisturbed():
     store, events = MemoryStore(), []
     outcome = run_job(arches(), PARTS, SETTINGS, store, events.append)
     assert store.saves >= 8
-    return fingerprint(outcome, events), (outcome.equilibria, outcome.newton_iterations), store.saves
+    return (
+        fingerprint(outcome, events),
+        (outcome.equilibria, outcome.newton_iterations),
+        store.saves,
+    )
 
 
 @pytest.mark.parametrize("after", [False, True])
@@ -77,11 +83,17 @@ def test_interrupted_again_and_again(undisturbed):
     assert fingerprint(outcome, events) == undisturbed[0]
 
 
-@pytest.mark.parametrize("damage", [
-    lambda arrays: arrays.pop("tally"), lambda arrays: arrays.pop("sqp/numbers"), lambda arrays: arrays.pop("kit"),
-    lambda arrays: arrays.update({"sqp/x": np.zeros(3)}), lambda arrays: arrays.update({"0/deployed/numbers": np.zeros(2)}),
-    lambda arrays: arrays.update({"states/0/deployed/numbers": np.zeros(2)}),
-])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda arrays: arrays.pop("tally"),
+        lambda arrays: arrays.pop("sqp/numbers"),
+        lambda arrays: arrays.pop("kit"),
+        lambda arrays: arrays.update({"sqp/x": np.zeros(3)}),
+        lambda arrays: arrays.update({"0/deployed/numbers": np.zeros(2)}),
+        lambda arrays: arrays.update({"states/0/deployed/numbers": np.zeros(2)}),
+    ],
+)
 def test_a_checkpoint_of_something_else(damage):
     store = MemoryStore()
     run_job(arches(), PARTS, SETTINGS, store)
@@ -106,7 +118,8 @@ def good(tmp_path_factory):
 class TestFullDisk:
     @pytest.mark.parametrize("write", [1, 3, 6, 11])
     def test_the_run_ends_cleanly_and_goes_on_later(self, tmp_path, monkeypatch, good, write):
-        """No space left at the write-th file: one line, the files before it whole, none half written, then resumed."""
+        """No space left at the write-th file: one line, the files before it whole, none half
+        written, then resumed."""
         original, writes = os.fsync, []
 
         def fsync(descriptor):

@@ -1,4 +1,6 @@
-"""Optimisation jobs that no user would ask for: they end in a kit or in a clean refusal, and never worse than they began."""
+"""Optimisation jobs that no user would ask for: they end in a kit or in a clean refusal, and never
+worse than they began."""
+
 from __future__ import annotations
 
 import os
@@ -9,13 +11,13 @@ import time
 import numpy as np
 import pytest
 
-from kop_exudyn.analysis.stress.arch import Arch, arches
-from kop_exudyn.analysis.stress.interruption import MemoryStore, fingerprint
 from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.kit.parts import Kit
-from kop_exudyn.optimize import pool
-from kop_exudyn.optimize.job import JobSettings, run_job
-from kop_exudyn.optimize.stage_settings import StageSettings
+from kop_exudyn.search import pool
+from kop_exudyn.search.job import JobSettings, run_job
+from kop_exudyn.search.settings import StageSettings
+from lib.stress.arch import Arch, arches
+from lib.stress.interruption import MemoryStore, fingerprint
 
 SCHEDULE = (1e3, 1e5)
 
@@ -26,7 +28,8 @@ def run(designs, parts, kit=None, **stages):
 
 
 def check(outcome, designs, given=False):
-    """What holds of every job that ended: finite values, stable states, every element exactly its part.
+    """What holds of every job that ended: finite values, stable states, every element exactly its
+    part.
 
     Only the parts of a given kit may be beyond the designs' own bounds.
     """
@@ -41,22 +44,37 @@ def check(outcome, designs, given=False):
     np.testing.assert_array_equal(np.concatenate([e.q for e in assigned.designs]), realised)
     if given:
         return
-    lower, upper = (np.concatenate([getattr(d, name) for d in designs]) for name in ("lower", "upper"))
+    lower, upper = (
+        np.concatenate([getattr(d, name) for d in designs]) for name in ("lower", "upper")
+    )
     assert (realised >= lower - 1e-12).all() and (realised <= upper + 1e-12).all()
 
 
 EVEN = np.full((5, 2), 0.12)
 
 
-@pytest.mark.parametrize("designs, parts", [
-    ([Arch("even", EVEN, 0.96)], 1),
-    ([Arch("even", EVEN, 0.96)], 2),  # fewer different elements than parts
-    ([Arch("even", EVEN, 0.96), Arch("twin", EVEN, 0.96)], 5),
-    ([Arch("mirrored", [[0.1, 0.12], [0.12, 0.1], [0.1, 0.12], [0.1, 0.12], [0.12, 0.1]], 0.9)], 3),
-    (arches(), 10),  # every element its own part
-])
+@pytest.mark.parametrize(
+    "designs, parts",
+    [
+        ([Arch("even", EVEN, 0.96)], 1),
+        ([Arch("even", EVEN, 0.96)], 2),  # fewer different elements than parts
+        ([Arch("even", EVEN, 0.96), Arch("twin", EVEN, 0.96)], 5),
+        (
+            [
+                Arch(
+                    "mirrored",
+                    [[0.1, 0.12], [0.12, 0.1], [0.1, 0.12], [0.1, 0.12], [0.12, 0.1]],
+                    0.9,
+                )
+            ],
+            3,
+        ),
+        (arches(), 10),  # every element its own part
+    ],
+)
 def test_elements_that_repeat_and_parts_to_spare(designs, parts):
-    """Nothing has to change: the objective stays that of the inputs, 0.02 a design, and can only fall by a trifle."""
+    """Nothing has to change: the objective stays that of the inputs, 0.02 a design, and can only
+    fall by a trifle."""
     outcome = run(designs, parts)
     check(outcome, designs)
     assert outcome.stages["assigned"].value == pytest.approx(0.02 * len(designs), rel=1e-3)
@@ -76,7 +94,9 @@ def test_bounds_that_bind(bounds):
     outcome = run(designs, 2, bounds={"linear": bounds})
     check(outcome, designs)
     for stage in outcome.stages.values():
-        assert (stage.kit["linear"] >= bounds[0] - 1e-12).all() and (stage.kit["linear"] <= bounds[1] + 1e-12).all()
+        assert (stage.kit["linear"] >= bounds[0] - 1e-12).all() and (
+            stage.kit["linear"] <= bounds[1] + 1e-12
+        ).all()
 
 
 def test_designs_whose_own_bounds_leave_no_room():
@@ -91,13 +111,17 @@ def test_bounds_without_room_for_any_part_are_refused():
         run(arches(), 2, bounds={"linear": (0.2, 0.1)})
 
 
-@pytest.mark.parametrize("schedule", [(1e-6,), (1e9,), (1e-6, 1e9), (1e9, 1e-6), (1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9)])
+@pytest.mark.parametrize(
+    "schedule", [(1e-6,), (1e9,), (1e-6, 1e9), (1e9, 1e-6), (1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9)]
+)
 def test_weights_of_the_clusters_over_fifteen_decades(schedule):
     designs = arches()
     outcome = run(designs, 2, schedule=schedule)
     check(outcome, designs)
     stages = outcome.stages
-    assert stages["assigned"].value <= stages["unrelaxed"].value * (1 + 1e-9) < stages["direct"].value
+    assert (
+        stages["assigned"].value <= stages["unrelaxed"].value * (1 + 1e-9) < stages["direct"].value
+    )
 
 
 def test_the_other_hessian():
@@ -120,8 +144,13 @@ def test_kits_that_the_designs_are_not_made_for(part, built, caplog):
             assert isinstance(evaluation, SimulationFailure) and "to the parts" in str(evaluation)
 
 
-@pytest.mark.parametrize("pieces, message", [
-    (np.full((5, 2), np.nan), "rest length of element 0 is nan"), (np.full((5, 2), -0.1), "not positive")])
+@pytest.mark.parametrize(
+    "pieces, message",
+    [
+        (np.full((5, 2), np.nan), "rest length of element 0 is nan"),
+        (np.full((5, 2), -0.1), "not positive"),
+    ],
+)
 def test_inputs_that_can_not_be_simulated(pieces, message):
     with pytest.raises(SimulationFailure, match=f"bad: input design: .*{message}"):
         run([*arches(1), Arch("bad", pieces, 0.5)], 2)
@@ -131,7 +160,10 @@ class TestWorkers:
     def test_killing_workers_changes_nothing(self, monkeypatch, caplog):
         """SIGKILL to a worker while it works, twice: the batch is run again by new workers."""
         designs = arches(3)
-        settings = JobSettings(jobs=2, stages=StageSettings(schedule=(1e3,), relaxed_steps=2, assigned_steps=2, path_steps=3))
+        settings = JobSettings(
+            jobs=2,
+            stages=StageSettings(schedule=(1e3,), relaxed_steps=2, assigned_steps=2, path_steps=3),
+        )
         undisturbed = fingerprint(run_job(designs, {"linear": 2}, settings))
         monkeypatch.setattr(pool, "_call", _slow_call)
         batches, kills = [], []

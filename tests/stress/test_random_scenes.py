@@ -1,7 +1,10 @@
-"""Random structures under bad conditions: a stable equilibrium or an honest failure, never anything in between.
+"""Random structures under bad conditions: a stable equilibrium or an honest failure, never anything
+in between.
 
-The first seeds of the study (studies/stress.py runs a thousand of them), and seeds that once showed a weakness.
+The first seeds of the study (studies/stress.py runs a thousand of them), and seeds that once showed
+a weakness.
 """
+
 from __future__ import annotations
 
 from collections import Counter
@@ -10,11 +13,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kop_exudyn.analysis.stress.random_scenes import FAMILIES, random_case
-from kop_exudyn.analysis.stress.trial import FAILED, STABLE, judge, run_case
 from kop_exudyn.equilibrium.newton import NewtonOptions
 from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.scene.state import State
+from lib.stress.random_scenes import FAMILIES, random_case
+from lib.stress.trial import FAILED, STABLE, judge, run_case
 
 SEEDS = range(60)
 FLAT = {"rotation": (0.0, 0.0, 0.0), "shift": (0.0, 0.0, 0.0), "disorder": 0.0}
@@ -37,13 +40,23 @@ def test_nearly_all_stand(outcomes):
 def test_the_seeds_cover_what_they_are_for():
     cases = [random_case(seed) for seed in SEEDS]
     conditions = [case.conditions for case in cases]
-    assert Counter(case.family for case in cases) == {family: len(SEEDS) // 3 for family in FAMILIES}
+    assert Counter(case.family for case in cases) == {
+        family: len(SEEDS) // 3 for family in FAMILIES
+    }
     assert max(c.slenderness for c in conditions) > 5e3 and max(c.ratio for c in conditions) > 25
     assert min(c.unit for c in conditions) < 1e-5 and max(c.unit for c in conditions) > 1e2
     assert np.ptp([np.log10(c.young) for c in conditions]) > 11
     assert max(np.linalg.norm(c.rotation) for c in conditions) > 2.8
-    assert max(c.change for c in conditions) > 0.19 and {c.disorder for c in conditions} == {0.0, 0.1, 1.0, 3.0}
-    assert sum(case.scene.n_hinges > 0 for case in cases) > 15 and sum(case.opening is not None for case in cases) > 5
+    assert max(c.change for c in conditions) > 0.19 and {c.disorder for c in conditions} == {
+        0.0,
+        0.1,
+        1.0,
+        3.0,
+    }
+    assert (
+        sum(case.scene.n_hinges > 0 for case in cases) > 15
+        and sum(case.opening is not None for case in cases) > 5
+    )
     for case, c in zip(cases, conditions):
         assert np.abs(case.q / case.rests - 1).max() <= c.change
 
@@ -63,7 +76,8 @@ def test_disordered_starts_need_the_softened_scene(seed):
 
 @pytest.mark.parametrize("seed", [27, 78, 93, 126])
 def test_flat_nets_buckle_out_of_their_plane(seed):
-    """Symmetry keeps the residual in the plane: the iteration used to creep up to the flat, unstable state."""
+    """Symmetry keeps the residual in the plane: the iteration used to creep up to the flat,
+    unstable state."""
     outcome = run_case(random_case(seed, **FLAT))
     assert outcome.verdict == STABLE
     assert np.ptp(outcome.equilibrium.state.positions[:, 2]) > 0
@@ -107,13 +121,19 @@ class TestJudge:
         case, eq = solved
         assert judge(case, replace(eq, torque=np.nan))[0] == "not finite"
 
-    @pytest.mark.parametrize("error, verdict", [
-        (SimulationFailure("no luck"), FAILED), (ZeroDivisionError("x"), "exception"), (MemoryError(), "exception")])
+    @pytest.mark.parametrize(
+        "error, verdict",
+        [
+            (SimulationFailure("no luck"), FAILED),
+            (ZeroDivisionError("x"), "exception"),
+            (MemoryError(), "exception"),
+        ],
+    )
     def test_errors(self, solved, monkeypatch, error, verdict):
         def fail(*arguments):
             raise error
 
-        monkeypatch.setattr("kop_exudyn.analysis.stress.trial.solve", fail)
+        monkeypatch.setattr("lib.stress.trial.solve", fail)
         outcome = run_case(solved[0])
         assert outcome.verdict == verdict and outcome.forbidden == (verdict != FAILED)
 
@@ -122,5 +142,5 @@ class TestJudge:
             while True:
                 pass
 
-        monkeypatch.setattr("kop_exudyn.analysis.stress.trial.solve", hang)
+        monkeypatch.setattr("lib.stress.trial.solve", hang)
         assert run_case(solved[0], seconds=0.05).verdict == "hang"

@@ -1,4 +1,6 @@
-"""C-shells: elements, stress-free assembly, opening through the bifurcation, and every kind of network."""
+"""C-shells: elements, stress-free assembly, opening through the bifurcation, and every kind of
+network."""
+
 import copy
 import json
 import pickle
@@ -11,19 +13,23 @@ from kop_exudyn.analysis.simulation import simulate
 from kop_exudyn.equilibrium.exudyn_model import ExudynModel
 from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.errors import InputError
-from kop_exudyn.optimize.input_fit import fit_input
-from kop_exudyn.optimize.objective import DesignObjective, Weights
+from kop_exudyn.search.input_fit import fit_input
+from kop_exudyn.search.objective import DesignObjective, Weights
 from kop_exudyn.structures.base import design_from_dict
 
 SMALL = 5  # joints a side
 
 
 def small(data, n=SMALL):
-    """The most curved corner of a conformal design, n x n joints, opened well past its bifurcation."""
+    """The most curved corner of a conformal design, n x n joints, opened well past its
+    bifurcation."""
     data = copy.deepcopy(data)
     side = len(data["curves"]) // 2
     keep = [c for c in range(2 * side) if c % side >= side - n]
-    data["curves"] = [dict(data["curves"][c], points=data["curves"][c]["points"][-4 * (n - 1) - 1:]) for c in keep]
+    data["curves"] = [
+        dict(data["curves"][c], points=data["curves"][c]["points"][-4 * (n - 1) - 1 :])
+        for c in keep
+    ]
     data["opening"]["angle"] = 0.8
     return data
 
@@ -45,7 +51,11 @@ def states(shell):
 
 def ring(radius, n=24):
     t = 2 * np.pi * np.arange(n) / n
-    return {"type": "spline", "closed": True, "points": (radius * np.stack([np.cos(t), np.sin(t)], axis=1)).tolist()}
+    return {
+        "type": "spline",
+        "closed": True,
+        "points": (radius * np.stack([np.cos(t), np.sin(t)], axis=1)).tolist(),
+    }
 
 
 def spoke(angle, inner=0.8, outer=2.2, bend=0.5):
@@ -57,16 +67,22 @@ def spoke(angle, inner=0.8, outer=2.2, bend=0.5):
 def wavy(rng, n=4):
     t = np.linspace(-0.3, n - 0.7, 6)
     bump = lambda: 0.12 * rng.normal(size=6)  # noqa: E731
-    rows = [np.stack([t, k + bump()], axis=1) for k in range(n)] + [np.stack([k + bump(), t], axis=1) for k in range(n)]
+    rows = [np.stack([t, k + bump()], axis=1) for k in range(n)] + [
+        np.stack([k + bump(), t], axis=1) for k in range(n)
+    ]
     return [{"type": "spline", "points": x.tolist()} for x in rows]
 
 
-# -- elements ----------------------------------------------------------------------------------------------------------
+# -- elements ----------------------------------------------------------------------------------
 def test_elements_of_a_grid(shell):
     """J joints: J linear elements, two of them with one length, and J - 1 corners."""
     by_size = {(g.kind, g.indices.shape[1]): len(g.indices) for g in shell.groups}
     curves = 2 * SMALL
-    assert by_size == {("linear", 2): curves * (SMALL - 2), ("linear", 1): 2 * curves, ("angular", 1): curves * (SMALL - 1)}
+    assert by_size == {
+        ("linear", 2): curves * (SMALL - 2),
+        ("linear", 1): 2 * curves,
+        ("angular", 1): curves * (SMALL - 1),
+    }
     used = np.concatenate([g.indices.ravel() for g in shell.groups])
     np.testing.assert_array_equal(np.sort(used), np.arange(len(shell.parameters)))
     assert np.all(shell.lower <= shell.parameters) and np.all(shell.parameters <= shell.upper)
@@ -81,8 +97,11 @@ def test_a_loop_has_no_end_elements():
 
 def test_free_ends_give_the_end_elements_their_second_length(conformal):
     data = small(conformal)
-    lines = [{"type": "polyline", "points": p} for p in
-             [[[-0.3, y], [2.3, y]] for y in (0, 1, 2)] + [[[x, -0.3], [x, 2.3]] for x in (0, 1, 2)]]
+    lines = [
+        {"type": "polyline", "points": p}
+        for p in [[[-0.3, y], [2.3, y]] for y in (0, 1, 2)]
+        + [[[x, -0.3], [x, 2.3]] for x in (0, 1, 2)]
+    ]
     design = design_from_dict({**data, "curves": lines, "free_ends": True})
     assert {(g.kind, g.indices.shape[1]) for g in design.groups} == {("linear", 2), ("angular", 1)}
     full = next(g for g in design.groups if g.kind == "linear")
@@ -90,7 +109,7 @@ def test_free_ends_give_the_end_elements_their_second_length(conformal):
     np.testing.assert_allclose(values, [0.3, 0.5])
 
 
-# -- states ------------------------------------------------------------------------------------------------------------
+# -- states ------------------------------------------------------------------------------------
 def test_the_flat_smooth_network_is_unstressed(shell):
     assert shell.smooth_path[0].elastic_energy < 1e-15 * shell.smooth_path[-1].elastic_energy
     assert shell.smooth_path[0].iterations == 0
@@ -136,7 +155,7 @@ def test_exudyn_confirms_both_states(shell, states):
 
 
 def test_the_target_passes_through_the_smooth_designs_joints(shell):
-    from kop_exudyn.scene.surface import TriangleSurface
+    from kop_exudyn.geometry.triangles import TriangleSurface
 
     target = shell.target
     at_joints = TriangleSurface(target.vertices, target.faces).closest(target.positions)
@@ -145,10 +164,18 @@ def test_the_target_passes_through_the_smooth_designs_joints(shell):
 
 
 def test_an_imperfection_unfolds_the_buckling_of_the_rest_state(conformal):
-    """Planar rest states stay in the plane; imperfect ones leave it without ever meeting a saddle."""
-    planar, imperfect = (design_from_dict({**small(conformal), "rest": rest}) for rest in ("planar", "imperfect"))
-    change = np.where(planar.layout.numbering.is_length, 2e-3, 0.02) * np.random.default_rng(1).normal(size=len(planar.parameters))
-    flat, bulged = (solve(d.systems["rest"], d.parameters + change, None, d.roles[1].opening) for d in (planar, imperfect))
+    """Planar rest states stay in the plane; imperfect ones leave it without ever meeting a
+    saddle."""
+    planar, imperfect = (
+        design_from_dict({**small(conformal), "rest": rest}) for rest in ("planar", "imperfect")
+    )
+    change = np.where(planar.layout.numbering.is_length, 2e-3, 0.02) * np.random.default_rng(
+        1
+    ).normal(size=len(planar.parameters))
+    flat, bulged = (
+        solve(d.systems["rest"], d.parameters + change, None, d.roles[1].opening)
+        for d in (planar, imperfect)
+    )
     assert np.abs(flat.state.positions[:, 2]).max() == 0
     assert np.abs(bulged.state.positions[:, 2]).max() > 1e-3 and bulged.escapes == 0
     assert bulged.elastic_energy < flat.elastic_energy
@@ -175,24 +202,42 @@ def test_the_direction_in_which_curves_are_drawn_does_not_matter(conformal, shel
 
 def test_it_travels_to_other_processes(shell, states):
     copied = pickle.loads(pickle.dumps(shell))
-    again = solve(copied.systems["rest"], copied.parameters, states["rest"], copied.roles[1].opening)
+    again = solve(
+        copied.systems["rest"], copied.parameters, states["rest"], copied.roles[1].opening
+    )
     assert again.iterations == 0
 
 
-# -- mistakes ----------------------------------------------------------------------------------------------------------
+# -- mistakes ----------------------------------------------------------------------------------
 BARE = {
-    "format": "kop_exudyn/design", "version": 1, "class": "c_shell", "name": "test",
-    "material": {"young": 2.1e9, "poisson": 0.35}, "section": {"type": "rectangle", "width": 0.03, "height": 0.004},
+    "format": "kop_exudyn/design",
+    "version": 1,
+    "class": "c_shell",
+    "name": "test",
+    "material": {"young": 2.1e9, "poisson": 0.35},
+    "section": {"type": "rectangle", "width": 0.03, "height": 0.004},
     "opening": {"angle": 0.3},
 }
 
 
-@pytest.mark.parametrize("curves, field", [
-    ([[[0, 0], [2, 0]], [[0, 1], [2, 1]], [[0.5, -1], [0.5, 2]], [[5, 5], [6, 6]]], r"curves\[3\].points: crosses no other"),
-    ([[[0, 0], [2, 0]], [[0, 1], [2, float("nan")]]], r"curves\[1\].points: contains numbers that are not finite"),
-    ([[[0, 0], [2, 0]], [[0.5, -1], [0.5, 1]]], r"curves\[0\].points: nothing is left"),
-    ([[[0, 0], [2, 0]], [[0, 1], [2, 1]], [[0.5, -1], [0.5, 2]]], r"curves\[2\]|nothing is left"),
-])
+@pytest.mark.parametrize(
+    "curves, field",
+    [
+        (
+            [[[0, 0], [2, 0]], [[0, 1], [2, 1]], [[0.5, -1], [0.5, 2]], [[5, 5], [6, 6]]],
+            r"curves\[3\].points: crosses no other",
+        ),
+        (
+            [[[0, 0], [2, 0]], [[0, 1], [2, float("nan")]]],
+            r"curves\[1\].points: contains numbers that are not finite",
+        ),
+        ([[[0, 0], [2, 0]], [[0.5, -1], [0.5, 1]]], r"curves\[0\].points: nothing is left"),
+        (
+            [[[0, 0], [2, 0]], [[0, 1], [2, 1]], [[0.5, -1], [0.5, 2]]],
+            r"curves\[2\]|nothing is left",
+        ),
+    ],
+)
 def test_mistakes_name_file_and_field(curves, field):
     data = {**BARE, "curves": [{"type": "polyline", "points": p} for p in curves]}
     with pytest.raises(InputError, match=field) as caught:
@@ -206,10 +251,12 @@ def test_crossings_listed_without_a_place(c_shell_data):
     assert len(design_from_dict({**c_shell_data, "crossings": pairs}).joints) == 9
 
 
-# -- a mesh as target --------------------------------------------------------------------------------------------------
+# -- a mesh as target --------------------------------------------------------------------------
 def write_mesh(path, vertices, faces):
-    path.write_text("".join(f"v {x:.12g} {y:.12g} {z:.12g}\n" for x, y, z in vertices)
-                    + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in faces))
+    path.write_text(
+        "".join(f"v {x:.12g} {y:.12g} {z:.12g}\n" for x, y, z in vertices)
+        + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in faces)
+    )
 
 
 class TestMeshTargets:
@@ -217,9 +264,12 @@ class TestMeshTargets:
         turn = Rotation.from_rotvec([0.05, -0.1, 0.2])
         own = shell.target
         write_mesh(tmp_path / "moved.obj", turn.apply(own.vertices) + 0.1 * own.diagonal, own.faces)
-        design = design_from_dict(small(conformal) | {"target": {"file": "moved.obj"}}, str(tmp_path / "shell.json"))
+        design = design_from_dict(
+            small(conformal) | {"target": {"file": "moved.obj"}}, str(tmp_path / "shell.json")
+        )
         places = turn.apply(own.positions) + 0.1 * own.diagonal
-        assert np.abs(design.target.positions - places).max() < 0.02 * own.diagonal  # slid along the surface a little
+        # slid along the surface a little
+        assert np.abs(design.target.positions - places).max() < 0.02 * own.diagonal
         mine, meshs = simulate(shell), simulate(design)
         assert meshs.fit.max_percent < mine.fit.max_percent + 0.1
 
@@ -228,18 +278,25 @@ class TestMeshTargets:
         own = shell.target
         flatter = own.vertices * [1.0, 1.0, 0.9]
         write_mesh(tmp_path / "flatter.obj", flatter, own.faces)
-        design = design_from_dict(small(conformal) | {"target": {"file": "flatter.obj"}}, str(tmp_path / "shell.json"))
+        design = design_from_dict(
+            small(conformal) | {"target": {"file": "flatter.obj"}}, str(tmp_path / "shell.json")
+        )
         before = DesignObjective(design, Weights(energy=0.0)).evaluate(design.parameters)
         after = fit_input(design, Weights(energy=0.0), max_steps=8)
         assert after.fit.value < 0.3 * before.fit.value and after.confirmations
 
-    @pytest.mark.parametrize("content, message", [
-        (None, "target.file = .*: no such file"),
-        ("v 0 0 0\n", "target.file = .*no.obj.: "),
-        ("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "target.file"),
-    ])
+    @pytest.mark.parametrize(
+        "content, message",
+        [
+            (None, "target.file = .*: no such file"),
+            ("v 0 0 0\n", "target.file = .*no.obj.: "),
+            ("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "target.file"),
+        ],
+    )
     def test_unusable_meshes(self, content, message, conformal, tmp_path):
         if content is not None:
             (tmp_path / "no.obj").write_text(content)
         with pytest.raises(InputError, match=message):
-            design_from_dict(small(conformal) | {"target": {"file": "no.obj"}}, str(tmp_path / "shell.json")).target
+            design_from_dict(
+                small(conformal) | {"target": {"file": "no.obj"}}, str(tmp_path / "shell.json")
+            ).target

@@ -1,12 +1,14 @@
-"""The ten designs of models/conformals: what the script writes, and that each is a sound network."""
+"""The ten designs of models/conformals: what the script writes, and that each is a sound
+network."""
+
 import importlib.util
 import json
 
 import numpy as np
 import pytest
 
-from kop_exudyn.structures.network import network_from_dict
-from kop_exudyn.structures.straightening import straighten
+from kop_exudyn.geometry.network import network_from_dict
+from kop_exudyn.structures.c_shell.straightening import straighten
 
 NUMBERS = range(10)
 
@@ -31,7 +33,8 @@ def test_the_script_writes_these_files(folder, files, tmp_path):
         assert written.name == kept.name
         new, old = json.loads(written.read_text()), json.loads(kept.read_text())
         for a, b in zip(new.pop("curves"), old.pop("curves"), strict=True):
-            np.testing.assert_allclose(a["points"], b["points"], atol=2e-9)  # other libms round the last digit otherwise
+            # other libms round the last digit otherwise
+            np.testing.assert_allclose(a["points"], b["points"], atol=2e-9)
         assert new == old
 
 

@@ -1,8 +1,11 @@
-"""A structure class is one file: this one is added from outside, and a kit is found for it without other changes.
+"""A structure class is one file: this one is added from outside, and a kit is found for it without
+other changes.
 
-The class is a planar elastica arch: a straight strip with J marked joints, clamped at nothing, its ends pinned closer
-together than it is long. Elements are the strip's pieces around a joint (two lengths).
+The class is a planar elastica arch: a straight strip with J marked joints, clamped at nothing, its
+ends pinned closer together than it is long. Elements are the strip's pieces around a joint (two
+lengths).
 """
+
 from __future__ import annotations
 
 from functools import cached_property
@@ -11,11 +14,12 @@ import numpy as np
 import pytest
 
 from kop_exudyn.errors import InputError
-from kop_exudyn.optimize.job import JobSettings, run_job
-from kop_exudyn.optimize.stage_settings import StageSettings
+from kop_exudyn.kit.groups import ElementGroup
 from kop_exudyn.rods.rotations import rotation_z
 from kop_exudyn.scene.builder import SceneBuilder
-from kop_exudyn.structures.base import Design, ElementGroup, Role, Target, design_from_dict, register, registered
+from kop_exudyn.search.job import JobSettings, run_job
+from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.structures.base import Design, Role, Target, design_from_dict, register, registered
 
 SECTION = np.array([1e5, 4e4, 4e4, 0.8, 1.0, 1.0])  # slender: EA L^2 / EI is about 1e5
 
@@ -45,7 +49,7 @@ class Arch(Design):
         bodies = builder.bodies(x, rotation_z(slope))
         nodes = builder.nodes(bodies)
         for k in range(len(q)):
-            builder.rod(nodes[2 * k: 2 * k + 3], SECTION, parameter=k)
+            builder.rod(nodes[2 * k : 2 * k + 3], SECTION, parameter=k)
         builder.pin(bodies[0], (0, 1, 2, 3, 4))
         builder.pin(bodies[-1], (0, 1, 2, 3))
         self.joints = bodies[2:-1:4]
@@ -78,8 +82,12 @@ def read(data, source):
 def designs():
     rng = np.random.default_rng(3)
     pieces = [0.1 + 0.04 * rng.random((6, 2)) for _ in range(3)]
-    return [design_from_dict({"class": "toy_arch", "name": f"arch {k}", "pieces": p.tolist(), "span": 0.8 * p.sum()})
-            for k, p in enumerate(pieces)]
+    return [
+        design_from_dict(
+            {"class": "toy_arch", "name": f"arch {k}", "pieces": p.tolist(), "span": 0.8 * p.sum()}
+        )
+        for k, p in enumerate(pieces)
+    ]
 
 
 def test_the_class_is_registered_beside_the_built_in_ones():
@@ -100,8 +108,13 @@ def test_two_stages_beat_the_direct_projection():
 
 def test_results_do_not_depend_on_the_number_of_processes():
     settings = StageSettings(schedule=(1e3, 1e5))
-    one, two = (run_job(designs(), {"linear": 3}, JobSettings(jobs=jobs, stages=settings)) for jobs in (1, 2))
-    np.testing.assert_array_equal(one.stages["assigned"].kit.vector, two.stages["assigned"].kit.vector)
+    one, two = (
+        run_job(designs(), {"linear": 3}, JobSettings(jobs=jobs, stages=settings))
+        for jobs in (1, 2)
+    )
+    np.testing.assert_array_equal(
+        one.stages["assigned"].kit.vector, two.stages["assigned"].kit.vector
+    )
 
 
 def test_more_parts_than_elements_are_refused():

@@ -1,4 +1,6 @@
-"""Orthogonal grids: straightening of lamellas, scenes, equilibria, bad input, the shipped designs."""
+"""Orthogonal grids: straightening of lamellas, scenes, equilibria, bad input, the shipped
+designs."""
+
 from __future__ import annotations
 
 import copy
@@ -7,27 +9,35 @@ import pickle
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from kop_exudyn.analysis.simulation import simulate
 from kop_exudyn.equilibrium.exudyn_model import ExudynModel
 from kop_exudyn.equilibrium.newton import NewtonOptions, solve
 from kop_exudyn.equilibrium.sensitivities import Sensitivities
-from kop_exudyn.analysis.simulation import simulate
 from kop_exudyn.errors import InputError, SimulationFailure
-from kop_exudyn.io.designs import load_design, load_designs
-from kop_exudyn.optimize.fitting import TargetFitting
+from kop_exudyn.io.datasets import load_designs
+from kop_exudyn.io.designs import load_design
+from kop_exudyn.search.objective import DesignObjective, Weights
 from kop_exudyn.structures.base import design_from_dict
-from kop_exudyn.structures.c_mesh import c_mesh_residuals
-from kop_exudyn.optimize.objective import DesignObjective, Weights
-from kop_exudyn.structures.lamellas import corner_height
-from kop_exudyn.structures.load_case import LoadCase
+from kop_exudyn.structures.fitting import TargetFitting
+from kop_exudyn.structures.grid.c_mesh import c_mesh_residuals
+from kop_exudyn.structures.grid.lamellas import corner_height
+from kop_exudyn.structures.loads import LoadCase
 
 
 def grid_data(surface: dict, network: dict, **more) -> dict:
     return {
-        "format": "kop_exudyn/design", "version": 1, "class": "grid", "name": "test",
-        "material": {"young": 2.1e9, "poisson": 0.35}, "section": {"type": "rectangle", "width": 0.004, "height": 0.03},
-        "surface": {"type": "analytic", **surface}, "network": network, **more,
+        "format": "kop_exudyn/design",
+        "version": 1,
+        "class": "grid",
+        "name": "test",
+        "material": {"young": 2.1e9, "poisson": 0.35},
+        "section": {"type": "rectangle", "width": 0.004, "height": 0.03},
+        "surface": {"type": "analytic", **surface},
+        "network": network,
+        **more,
     }
 
 
@@ -41,7 +51,10 @@ def isolines(half: float, n: int) -> dict:
 
 SADDLE = grid_data({"name": "paraboloid", "a": 0.9, "b": -0.7}, isolines(0.4, 4))
 ARC = np.linspace(-0.6, 0.6, 4)
-CYLINDER = grid_data({"name": "cylinder", "radius": 0.8}, {"type": "isolines", "u": (0.8 * ARC).tolist(), "v": lines(0.4, 3)})
+CYLINDER = grid_data(
+    {"name": "cylinder", "radius": 0.8},
+    {"type": "isolines", "u": (0.8 * ARC).tolist(), "v": lines(0.4, 3)},
+)
 
 
 @pytest.fixture(scope="module")
@@ -54,19 +67,26 @@ def deployed(saddle):
     return saddle.deploy()["deployed"]
 
 
-# -- straightening ----------------------------------------------------------------------------------------------------
+# -- straightening -----------------------------------------------------------------------------
 @given(share=st.floats(0.25, 0.75), turn=st.floats(-1.4, 1.4))
 def test_a_corner_over_its_chord_turns_by_its_angle(share, turn):
     h = corner_height(2.0, share, turn)
-    assert -np.arctan(h / (2.0 * share)) - np.arctan(h / (2.0 * (1 - share))) == pytest.approx(turn, abs=1e-12)
+    assert -np.arctan(h / (2.0 * share)) - np.arctan(h / (2.0 * (1 - share))) == pytest.approx(
+        turn, abs=1e-12
+    )
 
 
 def test_arcs_have_their_corners_where_the_tangents_meet():
     grid = design_from_dict(CYLINDER)
-    arcs = [lamella for lamella in grid.straight.lamellas if np.ptp(grid.network.joints[lamella.strand.joints, 1]) < 1e-9]
+    arcs = [
+        lamella
+        for lamella in grid.straight.lamellas
+        if np.ptp(grid.network.joints[lamella.strand.joints, 1]) < 1e-9
+    ]
     assert len(arcs) == 3
     for lamella in arcs:
-        np.testing.assert_allclose(lamella.spans.turns, -0.4, rtol=1e-7)  # the normal points outwards
+        # the normal points outwards
+        np.testing.assert_allclose(lamella.spans.turns, -0.4, rtol=1e-7)
         np.testing.assert_allclose(lamella.spans.before, 0.8 * np.tan(0.2), rtol=1e-7)
         np.testing.assert_allclose(lamella.spans.after, 0.8 * np.tan(0.2), rtol=1e-7)
 
@@ -92,22 +112,31 @@ def test_asymptotic_lamellas_are_straight_and_halved():
 @settings(max_examples=30, deadline=None)
 def test_corners_stay_between_joints_and_move_continuously(tilt, cubic):
     """Through inflections too, and with the angle always the integral of the normal curvature."""
+
     def spans(c):
         surface = {"name": "polynomial", "coefficients": [[0, 0, 0.2], [0], [tilt], [c]]}
         grid = design_from_dict(grid_data(surface, isolines(0.4, 3)))
-        return np.concatenate([[s.shares, s.turns] for s in (lamella.spans for lamella in grid.straight.lamellas)], axis=1)
+        return np.concatenate(
+            [[s.shares, s.turns] for s in (lamella.spans for lamella in grid.straight.lamellas)],
+            axis=1,
+        )
 
     (shares, turns), (nearby, _) = spans(cubic), spans(cubic + 1e-6)
     assert (shares >= 0.25).all() and (shares <= 0.75).all()
     assert np.abs(shares - nearby).max() < 1e-4
     x = np.array([-0.4, 0.0, 0.4])
-    slope = 2 * tilt * x + 3 * cubic * x**2  # on v = 0 the curve u lies in a plane of symmetry: slope angles differ
-    np.testing.assert_allclose(turns[6 + 2: 6 + 4], np.diff(np.arctan(slope)), atol=1e-6)
+    # on v = 0 the curve u lies in a plane of symmetry: slope angles differ
+    slope = 2 * tilt * x + 3 * cubic * x**2
+    np.testing.assert_allclose(turns[6 + 2 : 6 + 4], np.diff(np.arctan(slope)), atol=1e-6)
 
 
 def test_elements_cover_the_parameters_once(saddle):
     by_kind = {(group.kind, group.indices.shape[1]): group.indices for group in saddle.groups}
-    assert {key: len(value) for key, value in by_kind.items()} == {("linear", 2): 16, ("linear", 1): 16, ("angular", 1): 24}
+    assert {key: len(value) for key, value in by_kind.items()} == {
+        ("linear", 2): 16,
+        ("linear", 1): 16,
+        ("angular", 1): 24,
+    }
     used = np.concatenate([indices.ravel() for indices in by_kind.values()])
     np.testing.assert_array_equal(np.sort(used), np.arange(len(saddle.parameters)))
     assert not saddle.straight.numbering.is_length[by_kind["angular", 1]].any()
@@ -121,7 +150,7 @@ def test_turns_too_large_for_one_corner_are_refused():
         design_from_dict(grid_data({"name": "cylinder", "radius": 0.3}, isolines(0.45, 2)))
 
 
-# -- scenes -----------------------------------------------------------------------------------------------------------
+# -- scenes ------------------------------------------------------------------------------------
 def test_strong_axes_stand_along_the_surface_normal(saddle):
     scene = saddle.scene()
     state = scene.with_driven(scene.initial, saddle.parameters)
@@ -131,7 +160,8 @@ def test_strong_axes_stand_along_the_surface_normal(saddle):
     stations = np.isin(scene.node_body, saddle.joints)
     body = np.searchsorted(saddle.joints, scene.node_body[stations])
     np.testing.assert_allclose(R[stations][:, :, 2], normals[body], atol=1e-12)
-    assert scene.stiffness[0, 4] > 50 * scene.stiffness[0, 5]  # bending about y, in the lamella's plane, is the stiff one
+    # bending about y, in the lamella's plane, is the stiff one
+    assert scene.stiffness[0, 4] > 50 * scene.stiffness[0, 5]
 
 
 def test_corners_turn_about_the_lamellas_thin_direction(saddle):
@@ -149,10 +179,12 @@ def test_corners_turn_about_the_lamellas_thin_direction(saddle):
                 poses.append(scene.node_poses(scene.with_driven(scene.initial, q))[1][leave])
             before, after = poses
             np.testing.assert_allclose(after[:, 1], before[:, 1], atol=1e-14)
-            np.testing.assert_allclose(after[:, 0], np.cos(0.3) * before[:, 0] + np.sin(0.3) * before[:, 2], atol=1e-14)
+            np.testing.assert_allclose(
+                after[:, 0], np.cos(0.3) * before[:, 0] + np.sin(0.3) * before[:, 2], atol=1e-14
+            )
 
 
-# -- equilibria -------------------------------------------------------------------------------------------------------
+# -- equilibria --------------------------------------------------------------------------------
 def test_the_grid_keeps_to_its_surface_and_exudyn_agrees(saddle, deployed):
     assert deployed.stable and deployed.elastic_energy > 0
     fit = TargetFitting(saddle.target)(deployed.state.positions[saddle.joints])
@@ -174,8 +206,17 @@ def test_sensitivities_follow_taylor_in_lengths_and_angles(saddle, deployed):
     errors = []
     for h in (0.1, 0.05):
         moved = solve(system, saddle.parameters + h * direction, tight, options=options)
-        errors.append((abs(moved.elastic_energy - tight.elastic_energy - h * slope - 0.5 * h * h * curvature),
-                       np.abs(moved.state.positions[saddle.joints].ravel() - x - h * motion).max()))
+        errors.append(
+            (
+                abs(
+                    moved.elastic_energy
+                    - tight.elastic_energy
+                    - h * slope
+                    - 0.5 * h * h * curvature
+                ),
+                np.abs(moved.state.positions[saddle.joints].ravel() - x - h * motion).max(),
+            )
+        )
     assert errors[0][0] / errors[1][0] > 6 and errors[0][1] / errors[1][1] > 3
 
 
@@ -196,7 +237,11 @@ def test_units_do_not_matter(saddle, deployed):
     grid = design_from_dict(data)
     state = grid.deploy()["deployed"]
     assert state.elastic_energy * 1e-3 == pytest.approx(deployed.elastic_energy, rel=1e-6)
-    np.testing.assert_allclose(state.state.positions[grid.joints], 1000 * deployed.state.positions[saddle.joints], atol=1e-5)
+    np.testing.assert_allclose(
+        state.state.positions[grid.joints],
+        1000 * deployed.state.positions[saddle.joints],
+        atol=1e-5,
+    )
 
 
 def test_geodesic_lamellas_bend_in_their_own_planes_only():
@@ -204,25 +249,46 @@ def test_geodesic_lamellas_bend_in_their_own_planes_only():
     through = [[0.0, s, 0.0] for s in lines(0.4, 4)] + [[s, 0.0, np.pi / 2] for s in lines(0.4, 4)]
     network = {"type": "geodesics", "domain": [[-0.6, -0.6], [0.6, 0.6]], "through": through}
     surface = {"name": "paraboloid", "a": -1.2, "b": -0.9}
-    traced, iso = (design_from_dict(grid_data(surface, n)).deploy()["deployed"] for n in (network, isolines(0.4, 4)))
+    traced, iso = (
+        design_from_dict(grid_data(surface, n)).deploy()["deployed"]
+        for n in (network, isolines(0.4, 4))
+    )
     assert traced.elastic_energy < 0.2 * iso.elastic_energy
 
 
 def test_curvature_lines_of_a_minimal_surface_give_the_grid_of_its_isolines():
-    network = {"type": "curvature", "domain": [[-0.45, -0.45], [0.45, 0.45]],
-               "points": [[x, x + 0.01] for x in lines(0.4, 4)]}
-    grids = [design_from_dict(grid_data({"name": "enneper", "scale": 1.0}, n)) for n in (
-        network, {"type": "isolines", "u": lines(0.4, 4), "v": [x + 0.01 for x in lines(0.4, 4)]})]
+    network = {
+        "type": "curvature",
+        "domain": [[-0.45, -0.45], [0.45, 0.45]],
+        "points": [[x, x + 0.01] for x in lines(0.4, 4)],
+    }
+    grids = [
+        design_from_dict(grid_data({"name": "enneper", "scale": 1.0}, n))
+        for n in (
+            network,
+            {"type": "isolines", "u": lines(0.4, 4), "v": [x + 0.01 for x in lines(0.4, 4)]},
+        )
+    ]
     corners = [np.sort(grid.parameters[~grid.straight.numbering.is_length]) for grid in grids]
     np.testing.assert_allclose(*corners, atol=1e-6)
 
 
 def test_closed_lamellas_have_no_ends():
     turns = np.linspace(0, 2 * np.pi, 24, endpoint=False)
-    rings = [{"points": (r * np.stack([np.cos(turns), np.sin(turns)], axis=1)).tolist(), "closed": True} for r in (0.4, 0.6)]
-    spokes = [{"type": "polyline", "points": [[0.4 * c, 0.4 * s], [0.6 * c, 0.6 * s]]}
-              for c, s in np.stack([np.cos(turns[::2]), np.sin(turns[::2])], axis=1)]
-    grid = design_from_dict(grid_data({"name": "paraboloid", "a": -0.8, "b": -0.8}, {"type": "curves", "curves": rings + spokes}))
+    rings = [
+        {"points": (r * np.stack([np.cos(turns), np.sin(turns)], axis=1)).tolist(), "closed": True}
+        for r in (0.4, 0.6)
+    ]
+    spokes = [
+        {"type": "polyline", "points": [[0.4 * c, 0.4 * s], [0.6 * c, 0.6 * s]]}
+        for c, s in np.stack([np.cos(turns[::2]), np.sin(turns[::2])], axis=1)
+    ]
+    grid = design_from_dict(
+        grid_data(
+            {"name": "paraboloid", "a": -0.8, "b": -0.8},
+            {"type": "curves", "curves": rings + spokes},
+        )
+    )
     shapes = [(group.kind, group.indices.shape) for group in grid.groups]
     assert shapes == [("linear", (24, 2)), ("linear", (24, 1)), ("angular", (36, 1))]
     assert grid.deploy()["deployed"].stable
@@ -230,27 +296,45 @@ def test_closed_lamellas_have_no_ends():
 
 def test_the_target_is_the_design_surface_around_the_grid(saddle):
     target = saddle.target
-    np.testing.assert_allclose(target.vertices[:, 2], 0.45 * target.vertices[:, 0]**2 - 0.35 * target.vertices[:, 1]**2, atol=1e-14)
+    np.testing.assert_allclose(
+        target.vertices[:, 2],
+        0.45 * target.vertices[:, 0] ** 2 - 0.35 * target.vertices[:, 1] ** 2,
+        atol=1e-14,
+    )
     fit = TargetFitting(target)(target.positions)
     assert fit.max_percent < 1e-2
-    assert (target.vertices[:, :2].min(axis=0) < -0.5).all() and (target.vertices[:, :2].max(axis=0) > 0.5).all()
+    assert (target.vertices[:, :2].min(axis=0) < -0.5).all() and (
+        target.vertices[:, :2].max(axis=0) > 0.5
+    ).all()
     assert target.diagonal == pytest.approx(np.linalg.norm(np.ptp(target.positions, axis=0)))
 
 
 def test_designs_travel_to_other_processes(saddle, deployed):
     copied = pickle.loads(pickle.dumps(saddle))
-    np.testing.assert_array_equal(copied.deploy()["deployed"].state.positions, deployed.state.positions)
+    np.testing.assert_array_equal(
+        copied.deploy()["deployed"].state.positions, deployed.state.positions
+    )
 
 
-# -- C-meshes ---------------------------------------------------------------------------------------------------------
+# -- C-meshes ----------------------------------------------------------------------------------
 def test_asymptotic_lines_of_the_pseudosphere_collapse_to_a_straight_strip():
-    network = {"type": "asymptotic", "domain": [[0.4, -0.6], [1.6, 0.6]], "points": [[1.0, s] for s in lines(0.3, 4)]}
-    residuals = c_mesh_residuals(design_from_dict(grid_data({"name": "pseudosphere", "scale": 1.0}, network)))
-    assert residuals.collapses_straight() and residuals.straight < 1e-6 and residuals.chebyshev < 1e-6
+    network = {
+        "type": "asymptotic",
+        "domain": [[0.4, -0.6], [1.6, 0.6]],
+        "points": [[1.0, s] for s in lines(0.3, 4)],
+    }
+    residuals = c_mesh_residuals(
+        design_from_dict(grid_data({"name": "pseudosphere", "scale": 1.0}, network))
+    )
+    assert (
+        residuals.collapses_straight() and residuals.straight < 1e-6 and residuals.chebyshev < 1e-6
+    )
 
 
 def test_spheres_collapse_to_circular_strips_and_free_forms_do_not():
-    sphere = c_mesh_residuals(design_from_dict(grid_data({"name": "sphere", "radius": 1.0}, isolines(0.4, 4))))
+    sphere = c_mesh_residuals(
+        design_from_dict(grid_data({"name": "sphere", "radius": 1.0}, isolines(0.4, 4)))
+    )
     assert sphere.collapses_circular() and not sphere.collapses_straight()
     assert sphere.normal_curvature < 1e-12
     bumps = {"name": "gaussians", "bumps": [[0.2, 0.0, 0.1, 0.4]]}
@@ -258,7 +342,7 @@ def test_spheres_collapse_to_circular_strips_and_free_forms_do_not():
     assert not free.collapses_circular() and not free.collapses_straight()
 
 
-# -- files ------------------------------------------------------------------------------------------------------------
+# -- files -------------------------------------------------------------------------------------
 def test_shipped_designs_keep_to_their_surfaces(repository):
     designs = load_designs(repository / "models" / "grids")
     assert len(designs) >= 5
@@ -268,26 +352,55 @@ def test_shipped_designs_keep_to_their_surfaces(repository):
         assert state.stable and fit.max_percent < 2 and fit.mean_percent < 0.5, design.name
 
 
-@pytest.mark.parametrize("change, field", [
-    ({"surface": {"type": "analytic", "name": "dodecahedron"}}, "surface.name"),
-    ({"surface": {"type": "analytic", "name": "sphere", "radius": 0}}, "surface.radius"),
-    ({"surface": {"type": "analytic"}}, "surface"),
-    ({"surface": {"type": "analytic", "name": "sphere", "radius": "1"}}, "surface"),
-    ({"surface": {"type": "mesh", "file": "missing.obj"}}, "surface.file"),
-    ({"surface": {"type": "mesh", "file": "x.obj", "expression": "x*y"}}, "surface"),
-    ({"network": {"type": "isolines", "u": [0, 0.2], "v": [0.2, 0.1]}}, "network.v"),
-    ({"network": {"type": "isolines", "u": [0, 0.2]}}, "network"),
-    ({"network": {"type": "hexagons"}}, "network.type"),
-    ({"network": {"type": "geodesics", "domain": [[-1, -1], [1, 1]], "through": [[0, 2, 0.0], [0, 0, 1.0]]}},
-     "network.through[0]"),
-    ({"network": {"type": "asymptotic", "domain": [[1, -1], [-1, 1]], "points": [[0, 0]]}}, "network.domain"),
-    ({"network": {"type": "curves", "curves": [{"points": [[0, 0], [1, 0]]}, {"points": [[0, 1], [1, 1]]}]}},
-     "network.curves[0].points: crosses no other"),
-    ({"network": {"type": "curves", "curves": [{"points": [[0, 0], [1, y]]} for y in (0, 1, 2)]}},
-     "network.curves[2].points: passes through one point (0, 0) with network.curves[0].points, network.curves[1].points"),
-    ({"elements_per_piece": 0}, "elements_per_piece"),
-    ({"sections": 3}, "sections"),
-])
+@pytest.mark.parametrize(
+    "change, field",
+    [
+        ({"surface": {"type": "analytic", "name": "dodecahedron"}}, "surface.name"),
+        ({"surface": {"type": "analytic", "name": "sphere", "radius": 0}}, "surface.radius"),
+        ({"surface": {"type": "analytic"}}, "surface"),
+        ({"surface": {"type": "analytic", "name": "sphere", "radius": "1"}}, "surface"),
+        ({"surface": {"type": "mesh", "file": "missing.obj"}}, "surface.file"),
+        ({"surface": {"type": "mesh", "file": "x.obj", "expression": "x*y"}}, "surface"),
+        ({"network": {"type": "isolines", "u": [0, 0.2], "v": [0.2, 0.1]}}, "network.v"),
+        ({"network": {"type": "isolines", "u": [0, 0.2]}}, "network"),
+        ({"network": {"type": "hexagons"}}, "network.type"),
+        (
+            {
+                "network": {
+                    "type": "geodesics",
+                    "domain": [[-1, -1], [1, 1]],
+                    "through": [[0, 2, 0.0], [0, 0, 1.0]],
+                }
+            },
+            "network.through[0]",
+        ),
+        (
+            {"network": {"type": "asymptotic", "domain": [[1, -1], [-1, 1]], "points": [[0, 0]]}},
+            "network.domain",
+        ),
+        (
+            {
+                "network": {
+                    "type": "curves",
+                    "curves": [{"points": [[0, 0], [1, 0]]}, {"points": [[0, 1], [1, 1]]}],
+                }
+            },
+            "network.curves[0].points: crosses no other",
+        ),
+        (
+            {
+                "network": {
+                    "type": "curves",
+                    "curves": [{"points": [[0, 0], [1, y]]} for y in (0, 1, 2)],
+                }
+            },
+            "network.curves[2].points: passes through one point (0, 0) with "
+            "network.curves[0].points, network.curves[1].points",
+        ),
+        ({"elements_per_piece": 0}, "elements_per_piece"),
+        ({"sections": 3}, "sections"),
+    ],
+)
 def test_bad_design_files_are_named_with_their_field(write_json_file, change, field):
     with pytest.raises(InputError) as caught:
         load_design(write_json_file("bad.json", {**SADDLE, **change}))
@@ -303,7 +416,9 @@ def test_mesh_files_lie_beside_the_design(write_json_file, tmp_path):
     rows = [f"v {a} {b} {0.45 * a * a - 0.35 * b * b}" for a, b in zip(x, y)]
     rows += [f"f {a} {b} {c}\nf {a} {c} {d}" for a, b, c, d in quads]
     (tmp_path / "patch.obj").write_text("\n".join(rows))
-    path = write_json_file("meshed.json", {**SADDLE, "surface": {"type": "mesh", "file": "patch.obj"}})
+    path = write_json_file(
+        "meshed.json", {**SADDLE, "surface": {"type": "mesh", "file": "patch.obj"}}
+    )
     grid, exact = load_design(path), design_from_dict(SADDLE)
     lengths = exact.straight.numbering.is_length
     np.testing.assert_allclose(grid.parameters[lengths], exact.parameters[lengths], rtol=1e-3)
@@ -314,7 +429,7 @@ def test_mesh_files_lie_beside_the_design(write_json_file, tmp_path):
         load_design(write_json_file("beyond.json", beyond))
 
 
-# -- held joints ------------------------------------------------------------------------------------------------------
+# -- held joints -------------------------------------------------------------------------------
 DOME = grid_data({"name": "paraboloid", "a": -0.2, "b": -0.2}, isolines(0.8, 5))
 
 
@@ -325,7 +440,9 @@ def test_a_dome_that_nothing_holds_closes_like_scissors_and_says_so(caplog):
     assert "joints end up to" in caplog.text and "hardly resists that motion" in caplog.text
 
 
-@pytest.mark.parametrize("held, numbers", [("corners", [0, 4, 20, 24]), ([24, 0, 20], [0, 20, 24]), ("boundary", None)])
+@pytest.mark.parametrize(
+    "held, numbers", [("corners", [0, 4, 20, 24]), ([24, 0, 20], [0, 20, 24]), ("boundary", None)]
+)
 def test_held_joints_keep_a_dome_in_shape(held, numbers, caplog):
     design = design_from_dict(DOME | {"held": held})
     if numbers is None:
@@ -355,12 +472,15 @@ def test_sensitivities_of_a_held_grid():
     assert (ahead - back) / (2 * h) == pytest.approx(gradient @ direction, rel=1e-5)
 
 
-@pytest.mark.parametrize("held, message", [
-    ("edge", 'held = .edge.: expected numbers of joints, "corners" or "boundary"'),
-    ([0, 1, 25], "held = 25: names a joint that doesn't exist .joints 0 to 24"),
-    ([0, 4], "held = .0, 4.: joints on one line"),
-    ([-1, 4, 20], "held = -1: names a joint"),
-])
+@pytest.mark.parametrize(
+    "held, message",
+    [
+        ("edge", 'held = .edge.: expected numbers of joints, "corners" or "boundary"'),
+        ([0, 1, 25], "held = 25: names a joint that doesn't exist .joints 0 to 24"),
+        ([0, 4], "held = .0, 4.: joints on one line"),
+        ([-1, 4, 20], "held = -1: names a joint"),
+    ],
+)
 def test_joints_that_cant_be_held(held, message):
     with pytest.raises(InputError, match=message):
         design_from_dict(DOME | {"held": held})

@@ -1,4 +1,6 @@
-"""The small designs: written by their script, and usable, the one with straight outer curves included."""
+"""The small designs: written by their script, and usable, the one with straight outer curves
+included."""
+
 from __future__ import annotations
 
 import importlib.util
@@ -6,7 +8,7 @@ import importlib.util
 import numpy as np
 import pytest
 
-from kop_exudyn.io.designs import load_designs
+from kop_exudyn.io.datasets import load_designs
 
 
 @pytest.fixture
@@ -19,8 +21,9 @@ def test_the_script_writes_these_files(folder, tmp_path):
     make = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(make)
     files = make.write(tmp_path)
-    assert {path.name: path.read_text() for path in files} == \
-           {path.name: path.read_text() for path in folder.glob("*.json")}
+    assert {path.name: path.read_text() for path in files} == {
+        path.name: path.read_text() for path in folder.glob("*.json")
+    }
 
 
 def test_targets_are_whole_and_pass_through_the_joints(folder):
@@ -31,5 +34,7 @@ def test_targets_are_whole_and_pass_through_the_joints(folder):
         assert np.isfinite(target.vertices).all()
         edges = target.vertices[target.faces] - target.vertices[np.roll(target.faces, 1, axis=1)]
         assert np.linalg.norm(edges, axis=2).max() < 0.2 * target.diagonal
-        nearest = np.linalg.norm(target.vertices[None] - target.positions[:, None], axis=2).min(axis=1)
+        nearest = np.linalg.norm(target.vertices[None] - target.positions[:, None], axis=2).min(
+            axis=1
+        )
         assert nearest.max() < 1e-12

@@ -1,4 +1,5 @@
 """Umbrella meshes of our own layout, without released data."""
+
 from __future__ import annotations
 
 import copy
@@ -11,15 +12,15 @@ from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.equilibrium.sensitivities import Sensitivities
 from kop_exudyn.equilibrium.system import System
 from kop_exudyn.errors import InputError
-from kop_exudyn.io.documents import check_schema
-from kop_exudyn.io.meshes import sweep
-from kop_exudyn.io.pieces import DesignPieces
-from kop_exudyn.io.placement import PlacedPieces
-from kop_exudyn.optimize.fitting import best_placement
+from kop_exudyn.exchange.meshes import sweep
+from kop_exudyn.fabrication.pieces import DesignPieces
+from kop_exudyn.fabrication.placement import PlacedPieces
+from kop_exudyn.files.documents import check_schema
 from kop_exudyn.report.viewer_scenes import design_scene
 from kop_exudyn.structures.base import design_from_dict
-from kop_exudyn.structures.umbrella import Umbrella
-from kop_exudyn.structures.umbrella_layout import BaseMesh, Plates, umbrella_mesh
+from kop_exudyn.structures.fitting import best_placement
+from kop_exudyn.structures.umbrella.design import Umbrella
+from kop_exudyn.structures.umbrella.layout import BaseMesh, Plates, umbrella_mesh
 
 EDGE = 30 + 3 * np.sqrt(3)
 
@@ -29,12 +30,21 @@ def hexagon() -> dict:
     turn = np.arange(6) * np.pi / 3
     corners = EDGE * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     return {
-        "format": "kop_exudyn/design", "version": 1, "class": "umbrella", "name": "hexagon",
-        "base": {"vertices": [[0.0, 0.0], *corners.tolist()],
-                 "faces": [[0, k, k % 6 + 1] for k in range(1, 7)], "flipped": False},
+        "format": "kop_exudyn/design",
+        "version": 1,
+        "class": "umbrella",
+        "name": "hexagon",
+        "base": {
+            "vertices": [[0.0, 0.0], *corners.tolist()],
+            "faces": [[0, k, k % 6 + 1] for k in range(1, 7)],
+            "flipped": False,
+        },
         "lengths": [[34.0 + k, 36.0] for k in range(6)],
         "plates": {"arm_position": 10.0, "thickness": 3.0, "width": 5.0, "spacing": 15.0},
-        "materials": {"arms": {"young": 1400.0, "poisson": 0.35}, "plates": {"young": 14000.0, "poisson": 0.35}},
+        "materials": {
+            "arms": {"young": 1400.0, "poisson": 0.35},
+            "plates": {"young": 14000.0, "poisson": 0.35},
+        },
     }
 
 
@@ -63,7 +73,9 @@ def test_arms_meet_the_x_joints_upright_and_have_their_length(design):
     ends, rods = mesh.rod_ends[mesh.rods.arms], mesh.rods
     span = ends[:, 1] - ends[:, 0]
     assert np.abs(span[:, :2]).max() < 1e-12
-    assert np.linalg.norm(span, axis=1) == pytest.approx(mesh.lengths[rods.cells[rods.arms], rods.sides[rods.arms]])
+    assert np.linalg.norm(span, axis=1) == pytest.approx(
+        mesh.lengths[rods.cells[rods.arms], rods.sides[rods.arms]]
+    )
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.2])
@@ -91,7 +103,8 @@ def test_plates_are_rigid_bodies_or_nearly_so(design, deployed):
 
 
 def test_rigid_plates_are_the_limit_of_stiff_ones():
-    """The distance of the joints from those between rigid plates falls as one over the plates' modulus."""
+    """The distance of the joints from those between rigid plates falls as one over the plates'
+    modulus."""
     rigid = design_from_dict(hexagon() | {"plate_model": "rigid"})
     eq = rigid.deploy()["deployed"]
     wanted, apart, less = rigid.report_positions(eq.state), [], []
@@ -101,7 +114,9 @@ def test_rigid_plates_are_the_limit_of_stiff_ones():
         design = design_from_dict(data)
         found = design.deploy()["deployed"]
         x = design.report_positions(found.state)
-        apart.append(np.abs(best_placement(x, wanted, np.full(len(x), 1 / len(x))).apply(x) - wanted).max())
+        apart.append(
+            np.abs(best_placement(x, wanted, np.full(len(x), 1 / len(x))).apply(x) - wanted).max()
+        )
         less.append(eq.elastic_energy - found.elastic_energy)
     assert apart[1] < 1e-4 and apart[0] / apart[1] == pytest.approx(10, rel=0.1)
     assert less[0] / less[1] == pytest.approx(10, rel=0.1)
@@ -109,15 +124,23 @@ def test_rigid_plates_are_the_limit_of_stiff_ones():
 
 def test_rigid_plates_have_six_unknowns(design):
     mesh = design.mesh
-    plates, arms, crossings = mesh.centres.size, np.count_nonzero(mesh.rods.arms), len(mesh.crossings)
+    plates, arms, crossings = (
+        mesh.centres.size,
+        np.count_nonzero(mesh.rods.arms),
+        len(mesh.crossings),
+    )
     inner = 2 * arms  # bodies inside arms of three elements
     joints = plates + arms + crossings if design.plate_model == "rods" else plates + crossings
-    assert design.systems["deployed"].n_unknowns == 6 * (joints + inner) - 6 + np.count_nonzero(mesh.hinged)
+    assert design.systems["deployed"].n_unknowns == 6 * (joints + inner) - 6 + np.count_nonzero(
+        mesh.hinged
+    )
 
 
 def test_rigid_plates_are_drawn(design, deployed):
     solid = sweep(design.scene(), deployed.state)
-    assert len(solid.faces) > 0 and (np.count_nonzero(solid.elements < 0) > 0) == (design.plate_model == "rigid")
+    assert len(solid.faces) > 0 and (np.count_nonzero(solid.elements < 0) > 0) == (
+        design.plate_model == "rigid"
+    )
     pieces = PlacedPieces(DesignPieces(design, ()), design.scene())
     assert len(pieces.chain_pieces) == len(design.mesh.rods.joints) == len(design.scene().chains)
     rows = {len(chains) for chains in pieces.chains.values()}
@@ -137,8 +160,12 @@ def test_sensitivities_are_those_of_resolved_states(design, deployed):
     rate = sensitivities.positions(design.joints) @ direction
     energy_rate = sensitivities.energy_gradient @ direction
     step = 1e-4
-    states = [solve(System(design.scene()), deployed.q + s * direction, deployed) for s in (step, -step)]
-    moved = (states[0].state.positions - states[1].state.positions)[design.joints].ravel() / (2 * step)
+    states = [
+        solve(System(design.scene()), deployed.q + s * direction, deployed) for s in (step, -step)
+    ]
+    moved = (states[0].state.positions - states[1].state.positions)[design.joints].ravel() / (
+        2 * step
+    )
     assert np.allclose(moved, rate, atol=1e-4 * np.abs(rate).max())
     energy = (states[0].elastic_energy - states[1].elastic_energy) / (2 * step)
     assert energy == pytest.approx(energy_rate, rel=1e-4)
@@ -152,9 +179,12 @@ def test_a_mesh_without_a_target_is_compared_with_its_own_deployed_shape(design)
 
 
 def test_swapping_top_and_bottom_turns_the_structure_upside_down(design, deployed):
-    """A half turn about the y axis maps the mesh to itself, X axes included: cell k to 2 - k, top to bottom."""
+    """A half turn about the y axis maps the mesh to itself, X axes included: cell k to 2 - k, top
+    to bottom."""
     turned = design.with_lengths(design.mesh.lengths[(2 - np.arange(6)) % 6, ::-1])
-    assert turned.deploy()["deployed"].elastic_energy == pytest.approx(deployed.elastic_energy, rel=1e-6)
+    assert turned.deploy()["deployed"].elastic_energy == pytest.approx(
+        deployed.elastic_energy, rel=1e-6
+    )
 
 
 @pytest.mark.parametrize("unit", [0.001, 25.4])
@@ -172,20 +202,31 @@ def test_file_meets_its_schema():
     check_schema(hexagon() | {"plate_model": "rigid"}, "umbrella")
 
 
-@pytest.mark.parametrize("path, value, field", [
-    (("base", "faces"), [[0, 1, 9], [0, 2, 3]], "base.faces"),
-    (("base", "faces"), [[0, 1, 3], [0, 3, 2]], "base.faces"),
-    (("base", "faces"), [[0, 1, 2]], "base.faces"),
-    (("base", "vertices"), [[0.0, 0.0, 0.0]] * 7, "base.vertices"),
-    (("lengths",), [[30.0, 30.0]] * 5, "lengths"),
-    (("lengths",), [[30.0, -1.0]] * 6, "lengths"),
-    (("plates", "arm_position"), 40.0, "plates.arm_position"),
-    (("materials", "arms", "young"), -1.0, "young"),
-    (("arm_elements",), 0, "arm_elements"),
-    (("plate_model",), "soft", "plate_model"),
-    (("target",), {"vertices": [[0, 0, 0]], "faces": [[0, 0, 0]], "crossings": [[0, 0, 0]],
-                   "plates": [[0, 0, 0]] * 6}, "target.crossings"),
-])
+@pytest.mark.parametrize(
+    "path, value, field",
+    [
+        (("base", "faces"), [[0, 1, 9], [0, 2, 3]], "base.faces"),
+        (("base", "faces"), [[0, 1, 3], [0, 3, 2]], "base.faces"),
+        (("base", "faces"), [[0, 1, 2]], "base.faces"),
+        (("base", "vertices"), [[0.0, 0.0, 0.0]] * 7, "base.vertices"),
+        (("lengths",), [[30.0, 30.0]] * 5, "lengths"),
+        (("lengths",), [[30.0, -1.0]] * 6, "lengths"),
+        (("plates", "arm_position"), 40.0, "plates.arm_position"),
+        (("materials", "arms", "young"), -1.0, "young"),
+        (("arm_elements",), 0, "arm_elements"),
+        (("plate_model",), "soft", "plate_model"),
+        (
+            ("target",),
+            {
+                "vertices": [[0, 0, 0]],
+                "faces": [[0, 0, 0]],
+                "crossings": [[0, 0, 0]],
+                "plates": [[0, 0, 0]] * 6,
+            },
+            "target.crossings",
+        ),
+    ],
+)
 def test_wrong_files_are_refused_with_the_field(path, value, field):
     data = copy.deepcopy(hexagon())
     inner = data

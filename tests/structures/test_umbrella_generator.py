@@ -1,4 +1,5 @@
 """Umbrella designs of our own: patches, the rule for arm lengths, and the committed models."""
+
 from __future__ import annotations
 
 import importlib.util
@@ -9,21 +10,32 @@ import pytest
 
 from kop_exudyn.equilibrium.exudyn_model import ExudynModel
 from kop_exudyn.errors import InputError
+from kop_exudyn.files.documents import check_schema
 from kop_exudyn.io.designs import load_design
-from kop_exudyn.io.documents import check_schema
-from kop_exudyn.optimize.fitting import TargetFitting
-from kop_exudyn.structures.umbrella_generator import (
-    design_on_surface, height_field, hexagon_patch, parallelogram_patch, parametric_patch, triangle_patch)
-from kop_exudyn.structures.umbrella_layout import BaseMesh, Plates
+from kop_exudyn.structures.fitting import TargetFitting
+from kop_exudyn.structures.umbrella.generator import (
+    design_on_surface,
+    height_field,
+    hexagon_patch,
+    parallelogram_patch,
+    parametric_patch,
+    triangle_patch,
+)
+from kop_exudyn.structures.umbrella.layout import BaseMesh, Plates
 
 EDGE = 30 + 3 * np.sqrt(3)
 MODELS = ["dome", "hill", "monkey", "oval", "saddle", "wave"]
 
 
-@pytest.mark.parametrize("patch, n_cells, n_edges", [
-    (hexagon_patch(1, EDGE), 6, 6), (hexagon_patch(2, EDGE), 24, 30), (parallelogram_patch(4, 3, EDGE), 24, 29),
-    (triangle_patch(5, EDGE), 25, 30),
-])
+@pytest.mark.parametrize(
+    "patch, n_cells, n_edges",
+    [
+        (hexagon_patch(1, EDGE), 6, 6),
+        (hexagon_patch(2, EDGE), 24, 30),
+        (parallelogram_patch(4, 3, EDGE), 24, 29),
+        (triangle_patch(5, EDGE), 25, 30),
+    ],
+)
 def test_patches_are_lattices_of_equilateral_triangles(patch, n_cells, n_edges):
     base = BaseMesh(*patch)
     assert len(base.faces) == n_cells and len(base.inner) == n_edges
@@ -33,8 +45,13 @@ def test_patches_are_lattices_of_equilateral_triangles(patch, n_cells, n_edges):
 
 def test_on_a_plane_all_cells_grow_alike_and_follow_the_rule():
     base, plates = BaseMesh(*hexagon_patch(1, EDGE)), Plates()
-    data = design_on_surface("flat", base, *height_field(lambda x, y: 0.1 * x, 1000.0, 10), plates=plates,
-                             least_growth=4.5)
+    data = design_on_surface(
+        "flat",
+        base,
+        *height_field(lambda x, y: 0.1 * x, 1000.0, 10),
+        plates=plates,
+        least_growth=4.5,
+    )
     check_schema(data, "umbrella")
     expected = np.sqrt((4.5 * EDGE / np.sqrt(12) - 30 / np.sqrt(12)) ** 2 + 6.0**2)
     assert np.array(data["lengths"]) == pytest.approx(expected, abs=1e-3)
@@ -65,7 +82,9 @@ def test_growth_on_a_sphere_is_that_of_the_stereographic_projection():
 
 def test_a_patch_too_large_for_its_surface_is_refused():
     with pytest.raises(InputError, match="beyond the surface"):
-        design_on_surface("flat", BaseMesh(*hexagon_patch(3, EDGE)), *height_field(lambda x, y: 0 * x, 500.0, 6))
+        design_on_surface(
+            "flat", BaseMesh(*hexagon_patch(3, EDGE)), *height_field(lambda x, y: 0 * x, 500.0, 6)
+        )
 
 
 @pytest.fixture(scope="module")
@@ -87,11 +106,15 @@ def test_the_script_makes_every_model(script, repository):
 @pytest.mark.parametrize("name", MODELS)
 def test_models_are_what_the_script_writes(script, repository, name):
     made = script.make(name)
-    written = json.loads((repository / "models" / "umbrellas" / f"{name}.json").read_text(encoding="utf-8"))
+    written = json.loads(
+        (repository / "models" / "umbrellas" / f"{name}.json").read_text(encoding="utf-8")
+    )
     assert np.allclose(written["lengths"], made["lengths"], atol=2e-3)
     assert np.allclose(written["target"]["crossings"], made["target"]["crossings"], atol=0.02)
     assert written["base"]["faces"] == made["base"]["faces"]
-    assert written["materials"] == made["materials"] and made["materials"]["arms"]["density"] == 9e-10
+    assert (
+        written["materials"] == made["materials"] and made["materials"]["arms"]["density"] == 9e-10
+    )
 
 
 @pytest.mark.parametrize("name", MODELS)

@@ -1,4 +1,6 @@
-"""Released umbrella meshes as design files of our own; skipped where the released files are absent."""
+"""Released umbrella meshes as design files of our own; skipped where the released files are
+absent."""
+
 from __future__ import annotations
 
 import copy
@@ -9,12 +11,12 @@ import pytest
 from scipy.spatial.distance import pdist
 
 from kop_exudyn.errors import InputError
-from kop_exudyn.io.documents import check_schema
-from kop_exudyn.io.json_files import read_json
+from kop_exudyn.files.documents import check_schema
+from kop_exudyn.files.json_files import read_json
 from kop_exudyn.structures.base import design_from_dict
-from kop_exudyn.structures.umbrella import Umbrella
-from kop_exudyn.structures.umbrella_bodies import joint_bodies
-from kop_exudyn.structures.umbrella_import import import_release
+from kop_exudyn.structures.umbrella.bodies import joint_bodies
+from kop_exudyn.structures.umbrella.design import Umbrella
+from kop_exudyn.structures.umbrella.importer import import_release
 
 
 @pytest.fixture(scope="module")
@@ -31,14 +33,18 @@ def test_imported_design_is_the_same_structure_in_millimetres(content):
     assert own.lower == pytest.approx(unit * released.lower)
     a, b = own.deploy()["deployed"], released.deploy()["deployed"]
     assert a.elastic_energy == pytest.approx(unit**3 * b.elastic_energy, rel=1e-6)
-    distances = [np.sort(pdist(eq.state.positions[d.joints])) for eq, d in ((a, own), (b, released))]
+    distances = [
+        np.sort(pdist(eq.state.positions[d.joints])) for eq, d in ((a, own), (b, released))
+    ]
     assert distances[0] == pytest.approx(unit * distances[1], rel=1e-4)
 
 
 def test_imported_plates_may_be_rigid(content):
     data = import_release(content, "cap", plate_model="rigid")
     check_schema(data, "umbrella")
-    assert design_from_dict(data).plate_model == "rigid" and "plate_model" not in import_release(content, "cap")
+    assert design_from_dict(data).plate_model == "rigid" and "plate_model" not in import_release(
+        content, "cap"
+    )
 
 
 def test_rigid_plates_lie_on_side_a_of_their_joints(content):

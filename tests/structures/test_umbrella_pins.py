@@ -1,4 +1,5 @@
 """Umbrella meshes that stand on pins."""
+
 from __future__ import annotations
 
 import copy
@@ -10,13 +11,18 @@ from kop_exudyn.equilibrium.exudyn_model import ExudynModel
 from kop_exudyn.equilibrium.newton import NewtonOptions, solve
 from kop_exudyn.equilibrium.system import System
 from kop_exudyn.errors import InputError
-from kop_exudyn.io.documents import check_schema
-from kop_exudyn.optimize.objective import DesignObjective, Weights
+from kop_exudyn.files.documents import check_schema
+from kop_exudyn.search.objective import DesignObjective, Weights
 from kop_exudyn.structures.base import design_from_dict
-from kop_exudyn.structures.umbrella_generator import (
-    design_on_surface, height_field, hexagon_patch, parallelogram_patch, triangle_patch)
-from kop_exudyn.structures.umbrella_layout import BaseMesh
-from kop_exudyn.structures.umbrella_pins import corner_joints
+from kop_exudyn.structures.umbrella.generator import (
+    design_on_surface,
+    height_field,
+    hexagon_patch,
+    parallelogram_patch,
+    triangle_patch,
+)
+from kop_exudyn.structures.umbrella.layout import BaseMesh
+from kop_exudyn.structures.umbrella.pins import corner_joints
 
 EDGE = 30 + 3 * np.sqrt(3)
 
@@ -51,7 +57,9 @@ def test_pin_places_are_parameters_of_no_element(design):
 
 def test_pinned_joints_are_where_they_should_be(design, deployed):
     assert deployed.stable
-    assert np.allclose(deployed.state.positions[design.joints[[0, 2, 4]]], design.mesh.target.crossings[[0, 2, 4]])
+    assert np.allclose(
+        deployed.state.positions[design.joints[[0, 2, 4]]], design.mesh.target.crossings[[0, 2, 4]]
+    )
     assert design.systems["deployed"].scene.pinned.sum() == 0
 
 
@@ -61,7 +69,9 @@ def test_the_mesh_is_laid_on_its_pins_wherever_they_are(design, deployed):
     q[12:] = (q[12:].reshape(3, 3) @ turn.T + [100, 200, 300]).ravel()
     moved = design.deploy(q)["deployed"]
     assert moved.elastic_energy == pytest.approx(deployed.elastic_energy, rel=1e-8)
-    assert np.allclose(moved.state.positions, deployed.state.positions @ turn.T + [100, 200, 300], atol=1e-5)
+    assert np.allclose(
+        moved.state.positions, deployed.state.positions @ turn.T + [100, 200, 300], atol=1e-5
+    )
 
 
 def test_exudyn_confirms_the_pinned_state(design, deployed):
@@ -70,7 +80,8 @@ def test_exudyn_confirms_the_pinned_state(design, deployed):
 
 
 def test_gradient_of_the_objective_in_lengths_and_pins(design):
-    """By central differences of states solved anew, at a point where the fit matters as much as the energy."""
+    """By central differences of states solved anew, at a point where the fit matters as much as the
+    energy."""
     objective = DesignObjective(design, Weights(fit=1e3, energy=0.5))
     q = design.parameters + 0.3 * np.sin(np.arange(len(design.parameters)))
     derivatives = objective.derivatives(objective.evaluate(q))
@@ -80,26 +91,43 @@ def test_gradient_of_the_objective_in_lengths_and_pins(design):
         direction[part] = np.cos(np.arange(len(q)))[part]
         values = []
         for step in (1e-3, -1e-3):
-            state = solve(System(design.scene()), q + step * direction, at.equilibria["deployed"],
-                          options=NewtonOptions(tolerance=1e-12))
+            state = solve(
+                System(design.scene()),
+                q + step * direction,
+                at.equilibria["deployed"],
+                options=NewtonOptions(tolerance=1e-12),
+            )
             values.append(objective.judge(q + step * direction, {"deployed": state}).value)
-        assert (values[0] - values[1]) / 2e-3 == pytest.approx(derivatives.gradient @ direction, rel=1e-5)
+        assert (values[0] - values[1]) / 2e-3 == pytest.approx(
+            derivatives.gradient @ direction, rel=1e-5
+        )
     assert np.allclose(derivatives.hessian, derivatives.hessian.T)
 
 
 def test_other_lengths_keep_the_pins(design):
     other = design.with_lengths(1.1 * design.mesh.lengths)
-    assert other.pins is design.pins and np.array_equal(other.parameters[12:], design.parameters[12:])
+    assert other.pins is design.pins and np.array_equal(
+        other.parameters[12:], design.parameters[12:]
+    )
     assert other.least_length == design.least_length
 
 
-@pytest.mark.parametrize("patch, pins", [
-    (hexagon_patch(2, EDGE), 6), (triangle_patch(4, EDGE), 3), (parallelogram_patch(3, 4, EDGE), 4)])
+@pytest.mark.parametrize(
+    "patch, pins",
+    [
+        (hexagon_patch(2, EDGE), 6),
+        (triangle_patch(4, EDGE), 3),
+        (parallelogram_patch(3, 4, EDGE), 4),
+    ],
+)
 def test_corners_are_the_outlines_convex_ones(patch, pins):
     base = BaseMesh(*patch)
     found = corner_joints(base)
     assert len(found) == pins
-    middle, all_joints = base.vertices.mean(axis=0), np.linalg.norm(base.midpoints - base.vertices.mean(axis=0), axis=1)
+    middle, all_joints = (
+        base.vertices.mean(axis=0),
+        np.linalg.norm(base.midpoints - base.vertices.mean(axis=0), axis=1),
+    )
     assert np.linalg.norm(base.midpoints[found] - middle, axis=1).min() > np.median(all_joints)
 
 
@@ -111,10 +139,16 @@ def test_places_may_be_given():
     assert np.array_equal(design_from_dict(data).parameters[12:], np.ravel(places))
 
 
-@pytest.mark.parametrize("pins, field", [
-    ({"joints": [0, 1]}, "pins.joints"), ({"joints": [0, 1, 1]}, "pins.joints"), ({"joints": [0, 1, 6]}, "pins.joints"),
-    ({"joints": [0, 1, 2], "positions": [[0, 0, 0], [1, 0, 0]]}, "pins.positions"),
-    ({"joints": [0, 1, 2], "positions": [[0, 0, 0], [1, 0, 0], [3, 0, 0]]}, "pins.positions")])
+@pytest.mark.parametrize(
+    "pins, field",
+    [
+        ({"joints": [0, 1]}, "pins.joints"),
+        ({"joints": [0, 1, 1]}, "pins.joints"),
+        ({"joints": [0, 1, 6]}, "pins.joints"),
+        ({"joints": [0, 1, 2], "positions": [[0, 0, 0], [1, 0, 0]]}, "pins.positions"),
+        ({"joints": [0, 1, 2], "positions": [[0, 0, 0], [1, 0, 0], [3, 0, 0]]}, "pins.positions"),
+    ],
+)
 def test_wrong_pins_are_refused_with_the_field(pins, field):
     with pytest.raises(InputError, match=field):
         design_from_dict(bowl() | {"pins": pins}, "file.json")

@@ -1,4 +1,6 @@
-"""Released umbrella meshes against the reference simulator's states; skipped where the released files are absent."""
+"""Released umbrella meshes against the reference simulator's states; skipped where the released
+files are absent."""
+
 from __future__ import annotations
 
 import copy
@@ -11,11 +13,11 @@ from kop_exudyn.equilibrium.exudyn_model import ExudynModel
 from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.equilibrium.sensitivities import Sensitivities
 from kop_exudyn.errors import InputError
-from kop_exudyn.io.json_files import read_json
-from kop_exudyn.optimize.fitting import TargetFitting, best_placement
-from kop_exudyn.structures.umbrella import Umbrella
-from kop_exudyn.structures.umbrella_layout import BaseMesh, Plates, umbrella_mesh
-from kop_exudyn.structures.umbrella_release import is_release, release_mesh
+from kop_exudyn.files.json_files import read_json
+from kop_exudyn.structures.fitting import TargetFitting, best_placement
+from kop_exudyn.structures.umbrella.design import Umbrella
+from kop_exudyn.structures.umbrella.layout import BaseMesh, Plates, umbrella_mesh
+from kop_exudyn.structures.umbrella.release import is_release, release_mesh
 
 # largest joint distance from the reference, % of the bounding-box diagonal
 REFERENCES = {"sphere_cap_0.3": 0.02, "hemisphere_5t": 0.02, "saddle_5t": 0.2}
@@ -45,11 +47,15 @@ def test_final_states_agree_with_the_reference_simulator(content, name):
     design = Umbrella.from_release(content(name), name)
     state = design.deploy()["deployed"]
     reference = content("reference_states")[name]
-    apart = percent_apart(design.report_positions(state.state), np.array(reference["joint_positions"]))
+    apart = percent_apart(
+        design.report_positions(state.state), np.array(reference["joint_positions"])
+    )
     assert apart.max() <= REFERENCES[name]
     assert state.elastic_energy == pytest.approx(reference["elastic_energy"], rel=0.015)
     assert state.potential == pytest.approx(reference["total_energy"], rel=1e-4)
-    assert design.spacings(state.state) == pytest.approx(np.array(reference["plate_spacing"]), rel=1e-3)
+    assert design.spacings(state.state) == pytest.approx(
+        np.array(reference["plate_spacing"]), rel=1e-3
+    )
 
 
 def test_rigid_plates_are_cheaper_and_nearly_the_same(content):
@@ -76,7 +82,8 @@ def test_lilium_deploys_ends_stable_and_is_confirmed_by_exudyn(content):
 
 
 def test_published_optimised_shape_is_reached_by_its_arm_lengths(content):
-    """The file gives the deployed joints; the arm lengths that lead there are found from them, then deployed anew."""
+    """The file gives the deployed joints; the arm lengths that lead there are found from them, then
+    deployed anew."""
     published = content("hemisphere_5t_published_equilibria")
     wanted = np.array(published["tsf+energy"]["deformed_physical_joints"])
     design = Umbrella.from_release(content("hemisphere_5t"), "hemisphere_5t")
@@ -87,7 +94,11 @@ def test_published_optimised_shape_is_reached_by_its_arm_lengths(content):
         x = x[rods.joints[rods.arms]]
         return np.bincount(slots, np.linalg.norm(x[:, 0] - x[:, 1], axis=1)) / np.bincount(slots)
 
-    q = design.parameters * chords(wanted) / chords(np.array(published["input"]["deformed_physical_joints"]))
+    q = (
+        design.parameters
+        * chords(wanted)
+        / chords(np.array(published["input"]["deformed_physical_joints"]))
+    )
     state = design.deploy(q)["deployed"]
     joints = np.arange(len(wanted))
     for _ in range(3):
@@ -96,7 +107,9 @@ def test_published_optimised_shape_is_reached_by_its_arm_lengths(content):
         rows = Sensitivities(design.systems["deployed"], state).positions(joints)
         turns = np.stack([np.cross(axis, x) for axis in np.eye(3)], axis=2).reshape(-1, 3)
         motions = np.hstack([np.tile(np.eye(3), (len(x), 1)), turns])
-        step = np.linalg.lstsq(np.hstack([rows, motions]), (place.apply(wanted) - x).ravel(), rcond=1e-4)[0]
+        step = np.linalg.lstsq(
+            np.hstack([rows, motions]), (place.apply(wanted) - x).ravel(), rcond=1e-4
+        )[0]
         q = q + step[: len(q)]
         state = solve(design.systems["deployed"], q, state)
     state = design.deploy(q)["deployed"]
@@ -110,8 +123,11 @@ def test_our_layout_of_the_base_mesh_is_the_released_one(content, name):
     data = content(name)
     released = release_mesh(data)
     base = BaseMesh(np.array(data["base_mesh_v"])[:, :2], data["base_mesh_f"], data["flip_bits"][0])
-    ours = umbrella_mesh(base, released.lengths, Plates(
-        data["arm_joint_offset"], released.thickness, released.width, released.spacing))
+    ours = umbrella_mesh(
+        base,
+        released.lengths,
+        Plates(data["arm_joint_offset"], released.thickness, released.width, released.spacing),
+    )
     assert released.plate_edge == pytest.approx(ours.plate_edge)
     theirs, mine = arm_table(released), arm_table(ours)
     distance, where = cKDTree(theirs).query(mine)
@@ -119,30 +135,41 @@ def test_our_layout_of_the_base_mesh_is_the_released_one(content, name):
 
 
 def arm_table(mesh) -> np.ndarray:
-    """One row an arm: its joints, ends, the axes that it turns about with their sense, cell and side."""
+    """One row an arm: its joints, ends, the axes that it turns about with their sense, cell and
+    side."""
     rods, arms = mesh.rods, mesh.rods.arms
     order = np.argsort(np.isin(rods.joints, mesh.crossings), axis=1)[arms]
     pick = np.arange(len(order))[:, None], order
     axes = np.where(rods.behind, 1, -1)[:, :, None] * mesh.frames[rods.joints][:, :, :, 2]
-    return np.concatenate([mesh.positions[rods.joints[arms][pick]].reshape(-1, 6),
-                           mesh.rod_ends[arms][pick].reshape(-1, 6), axes[arms][pick].reshape(-1, 6),
-                           rods.cells[arms][:, None], rods.sides[arms][:, None]], axis=1)
+    return np.concatenate(
+        [
+            mesh.positions[rods.joints[arms][pick]].reshape(-1, 6),
+            mesh.rod_ends[arms][pick].reshape(-1, 6),
+            axes[arms][pick].reshape(-1, 6),
+            rods.cells[arms][:, None],
+            rods.sides[arms][:, None],
+        ],
+        axis=1,
+    )
 
 
-@pytest.mark.parametrize("change, field", [
-    (lambda d: d.update(bbox_diagonal=-1), "bbox_diagonal"),
-    (lambda d: d["vertices"].pop(), "v_labels"),
-    (lambda d: d["vertices"].__setitem__(3, [0.0, float("nan"), 0.0]), "vertices"),
-    (lambda d: d["v_labels"].__setitem__(0, "QQ"), "v_labels"),
-    (lambda d: d["uid"].__setitem__(1, [99999, 0]), "uid"),
-    (lambda d: d["edges"].__setitem__(0, [0, 10**7]), "edges"),
-    (lambda d: d["A_segments"].__setitem__(0, [5, 6, 7]), "A_segments"),
-    (lambda d: d["midpoint_offsets_A"].__setitem__(0, []), "midpoint_offsets_A"),
-    (lambda d: d["ghost_normals"].__setitem__(0, [0.0, 1.0, 1.0]), "ghost_normals"),
-    (lambda d: d["segment_normals"].__setitem__(0, [0.0, 0.0, 2.0]), "segment_normals"),
-    (lambda d: d["target_f"].__setitem__(0, [0, 1, -1]), "target_f"),
-    (lambda d: d.pop("edges"), "edges"),
-])
+@pytest.mark.parametrize(
+    "change, field",
+    [
+        (lambda d: d.update(bbox_diagonal=-1), "bbox_diagonal"),
+        (lambda d: d["vertices"].pop(), "v_labels"),
+        (lambda d: d["vertices"].__setitem__(3, [0.0, float("nan"), 0.0]), "vertices"),
+        (lambda d: d["v_labels"].__setitem__(0, "QQ"), "v_labels"),
+        (lambda d: d["uid"].__setitem__(1, [99999, 0]), "uid"),
+        (lambda d: d["edges"].__setitem__(0, [0, 10**7]), "edges"),
+        (lambda d: d["A_segments"].__setitem__(0, [5, 6, 7]), "A_segments"),
+        (lambda d: d["midpoint_offsets_A"].__setitem__(0, []), "midpoint_offsets_A"),
+        (lambda d: d["ghost_normals"].__setitem__(0, [0.0, 1.0, 1.0]), "ghost_normals"),
+        (lambda d: d["segment_normals"].__setitem__(0, [0.0, 0.0, 2.0]), "segment_normals"),
+        (lambda d: d["target_f"].__setitem__(0, [0, 1, -1]), "target_f"),
+        (lambda d: d.pop("edges"), "edges"),
+    ],
+)
 def test_damaged_files_are_refused_with_the_field(content, change, field):
     data = copy.deepcopy(content("saddle_5t"))
     change(data)
@@ -152,4 +179,8 @@ def test_damaged_files_are_refused_with_the_field(content, change, field):
 
 def test_released_files_are_told_from_others(content):
     assert is_release(content("saddle_5t"))
-    assert not is_release(content("reference_states")) and not is_release([1]) and not is_release({"class": "umbrella"})
+    assert (
+        not is_release(content("reference_states"))
+        and not is_release([1])
+        and not is_release({"class": "umbrella"})
+    )

@@ -1,4 +1,5 @@
 """The benchmark in its quick mode: all parts are there, and their figures hang together."""
+
 from __future__ import annotations
 
 import json
@@ -35,9 +36,13 @@ def test_all_ways_agree_where_they_converge(found):
 
 def test_phases_add_up_and_memory_is_bounded(found):
     for row in found["scaling"]:
-        assert row["assembly"] + row["factorisation"] + row["rest"] == pytest.approx(row["seconds"], rel=1e-6)
+        assert row["assembly"] + row["factorisation"] + row["rest"] == pytest.approx(
+            row["seconds"], rel=1e-6
+        )
         assert row["before MiB"] <= row["peak MiB"] < 2048
-    assert [row["unknowns"] for row in found["scaling"]] == sorted(row["unknowns"] for row in found["scaling"])
+    assert [row["unknowns"] for row in found["scaling"]] == sorted(
+        row["unknowns"] for row in found["scaling"]
+    )
 
 
 def test_steps_lower_the_objective(found):

@@ -1,4 +1,5 @@
 """The studies of the stages, of failures, of errors and of pavilions, in their quick modes."""
+
 from __future__ import annotations
 
 import json
@@ -13,7 +14,8 @@ STUDIES = Path(__file__).resolve().parents[2] / "studies"
 
 @pytest.fixture(scope="module")
 def out(tmp_path_factory):
-    """One folder for all reports, so that the runs that several studies look at are computed once."""
+    """One folder for all reports, so that the runs that several studies look at are computed
+    once."""
     return tmp_path_factory.mktemp("reports")
 
 
@@ -23,11 +25,15 @@ def run(out, monkeypatch):
 
     def run(name: str) -> dict:
         folder = out / name
-        monkeypatch.setattr(sys, "argv", [f"{name}.py", "--quick", "--jobs", "1", "--out", str(folder)])
+        monkeypatch.setattr(
+            sys, "argv", [f"{name}.py", "--quick", "--jobs", "1", "--out", str(folder)]
+        )
         runpy.run_path(str(STUDIES / f"{name}.py"), run_name="__main__")
         page = (folder / "index.html").read_text()
         data = json.loads((folder / "data.json").read_text())
-        assert data["quick"] and data["finding"] in page.replace("&#x27;", "'").replace("&amp;", "&")
+        assert data["quick"] and data["finding"] in page.replace("&#x27;", "'").replace(
+            "&amp;", "&"
+        )
         assert page.count("<img") >= 1
         return data
 
@@ -37,7 +43,11 @@ def run(out, monkeypatch):
 def test_direct_vs_relaxed(run):
     data = run("direct_vs_relaxed")
     rows = data["designs"]
-    assert {row["class"] for row in rows} == {"C-shells", "grids", "umbrella meshes"} == set(data["times"]["kits_s"])
+    assert (
+        {row["class"] for row in rows}
+        == {"C-shells", "grids", "umbrella meshes"}
+        == set(data["times"]["kits_s"])
+    )
     assert 0 < sum(data["times"]["kits_s"].values()) < data["times"]["wall_s"]
     for row in rows:
         assert row["failed"] == "–" and row["assigned max %"] < row["direct max %"]
@@ -45,14 +55,19 @@ def test_direct_vs_relaxed(run):
 
 def test_robustness(run):
     data = run("robustness")
-    assert len(data["designs"]) == 3 and all(row["snapped"] == row["failed"] == 0 for row in data["designs"])
+    assert len(data["designs"]) == 3 and all(
+        row["snapped"] == row["failed"] == 0 for row in data["designs"]
+    )
     for small, large in zip(data["missed"]["0.1"], data["missed"]["1"]):
         assert small < 0.1 and small < large
 
 
 def test_two_stage_history(run):
     rows = run("two_stage_history")["hessians"]
-    assert {(row["Hessian"], row["stage"]) for row in rows} >= {("exact", "relaxed"), ("bfgs", "relaxed")}
+    assert {(row["Hessian"], row["stage"]) for row in rows} >= {
+        ("exact", "relaxed"),
+        ("bfgs", "relaxed"),
+    }
     assert all(row["steps"] >= 1 and row["points tried"] >= row["steps"] for row in rows)
 
 

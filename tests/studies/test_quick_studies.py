@@ -1,4 +1,6 @@
-"""The studies of kits, in their quick mode: one folder of reports, so that later studies find the kits of the first."""
+"""The studies of kits, in their quick mode: one folder of reports, so that later studies find the
+kits of the first."""
+
 from __future__ import annotations
 
 import csv
@@ -10,14 +12,20 @@ from pathlib import Path
 import pytest
 
 STUDIES = Path(__file__).resolve().parents[2] / "studies"
-FIGURES = {"kit_size_tradeoff": ["tradeoff"], "part_reuse": ["sharing", "subsets", "sizes"],
-           "project_new_design": ["sweep", "changes"], "slit_parts": ["slits", "intervals"]}
+FIGURES = {
+    "kit_size_tradeoff": ["tradeoff"],
+    "part_reuse": ["sharing", "subsets", "sizes"],
+    "project_new_design": ["sweep", "changes"],
+    "slit_parts": ["slits", "intervals"],
+}
 
 
 def run(name: str, reports: Path, *arguments: str) -> Path:
     """Run a study as its command does; the folder of its report."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", [name, "--quick", "--jobs", "1", "--out", str(reports / name), *arguments])
+        patch.setattr(
+            sys, "argv", [name, "--quick", "--jobs", "1", "--out", str(reports / name), *arguments]
+        )
         runpy.run_path(str(STUDIES / f"{name}.py"), run_name="__main__")
     return reports / name
 
@@ -61,7 +69,9 @@ def test_other_studies_take_the_kits_from_there(reports):
 
 def test_reuse_agrees_with_the_sizes(reports):
     reuse, sizes = data_of(reports, "part_reuse"), data_of(reports, "kit_size_tradeoff")
-    assert [row["kit size %"] for row in reuse["kits"]] == [row["kit size %"] for row in sizes["kits"]]
+    assert [row["kit size %"] for row in reuse["kits"]] == [
+        row["kit size %"] for row in sizes["kits"]
+    ]
     for details in reuse["details"].values():
         (pair,) = details["subsets"]
         assert pair["reuse"] == details["average_reuse"] == details["jaccard"][0][1]
@@ -78,7 +88,10 @@ def test_slits_help_and_more_parts_need_shorter_ones(reports):
     cases = {(row["parts"], row["cost"]): row for row in data_of(reports, "slit_parts")["cases"]}
     for parts in (2, 4):
         plain, slit = cases[parts, None], cases[parts, 0.01]
-        assert slit["projection energy"] < 0.1 * plain["projection energy"] and slit["max %"] < plain["max %"]
+        assert (
+            slit["projection energy"] < 0.1 * plain["projection energy"]
+            and slit["max %"] < plain["max %"]
+        )
         assert plain["longest slit %"] == 0
     assert cases[4, 0.01]["mean slit %"] < cases[2, 0.01]["mean slit %"]
 
@@ -87,5 +100,7 @@ def test_a_resumed_study_computes_nothing_again(reports):
     before = data_of(reports, "slit_parts")
     kept = {path: path.stat().st_mtime_ns for path in (reports / "slit_parts" / "sweep").iterdir()}
     run("slit_parts", reports, "--resume")
-    assert {path: path.stat().st_mtime_ns for path in (reports / "slit_parts" / "sweep").iterdir()} == kept
+    assert {
+        path: path.stat().st_mtime_ns for path in (reports / "slit_parts" / "sweep").iterdir()
+    } == kept
     assert data_of(reports, "slit_parts")["cases"] == before["cases"]

@@ -1,1 +1,0 @@
-"""Tools that try to break the rest: seeded random structures, interrupted runs, and judges that trust nobody."""

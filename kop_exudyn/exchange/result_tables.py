@@ -1,0 +1,165 @@
+"""Everything in a result as flat tables: designs, elements, joints, rod elements, steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from ..equilibrium.newton import Equilibrium
+from ..fabrication.pieces import parts_list_of
+from ..search.objective import Evaluation
+from ..search.result import INPUT, REDEPLOYED, STAGES, KitResult
+from ..structures.base import Design
+from ..structures.strength import design_strength
+from .vtk import element_fields
+
+Rows = list[dict[str, Any]]
+
+
+def result_tables(result: KitResult) -> dict[str, Rows]:
+    """Name of a table -> its rows, ready for `tables.write_csv`; lengths in the designs' unit,
+    angles in radians.
+
+    designs : one row a design and stage, the input and where the assigned design opens into
+        included: fit in % of the bounding box, energy, utilisation; or the failure
+    elements : one row an element: its part and variant, and its parameters as in the input and in
+        every stage
+    joints : one row a design, stage and joint: place and distance from the target
+    rods : one row a design, state of the last stage and rod element: strains, stress resultants,
+        stresses
+    steps : one row an accepted step of the optimisation
+    """
+    return {
+        "designs": list(_designs(result)),
+        "elements": list(_elements(result)),
+        "joints": list(_joints(result)),
+        "rods": list(_rods(result)),
+        "steps": list(_steps(result)),
+    }
+
+
+def _evaluations(result: KitResult) -> Iterator[tuple[str, int, Design, Any]]:
+    """Every design after every stage, and where it opens into by itself: stage "redeployed"."""
+    outcomes = {stage: result.stages[stage].designs for stage in STAGES if stage in result.stages}
+    for stage, found in (outcomes | {REDEPLOYED: result.redeployed}).items():
+        for n, (design, outcome) in enumerate(zip(result.designs, found)):
+            yield stage, n, design, outcome
+
+
+def _designs(result: KitResult) -> Iterator[dict[str, Any]]:
+    for n, design in enumerate(result.designs):
+        yield {
+            "design": design.name,
+            "class": design.class_name,
+            "stage": INPUT,
+            "elements": design.n_elements,
+            **result.input_summary(n)["fit"],
+            **_states(result, n, result.references[n].equilibria),
+        }
+    for stage, n, design, outcome in _evaluations(result):
+        row = {
+            "design": design.name,
+            "class": design.class_name,
+            "stage": stage,
+            "elements": design.n_elements,
+        }
+        if not isinstance(outcome, Evaluation):
+            yield row | {"failed": str(outcome)}
+            continue
+        row |= {"max_percent": outcome.fit.max_percent, "mean_percent": outcome.fit.mean_percent}
+        yield row | _states(result, n, outcome.equilibria)
+
+
+def _states(
+    result: KitResult, number: int, equilibria: Mapping[str, Equilibrium]
+) -> dict[str, Any]:
+    """Energies, stability, actuation and stresses of one design's states."""
+    row: dict[str, Any] = {}
+    for role, strength in design_strength(result.designs[number], equilibria).items():
+        equilibrium = equilibria[role]
+        row |= {
+            f"{role}_energy": equilibrium.elastic_energy,
+            f"{role}_energy_ratio": equilibrium.elastic_energy / result.references[number].energy,
+            f"{role}_stable": equilibrium.stable,
+            f"{role}_opening": equilibrium.opening,
+            f"{role}_torque": equilibrium.torque,
+        }
+        row |= {
+            f"{role}_{name}": value
+            for name, value in strength.to_dict().items()
+            if name != "element"
+        }
+    return row
+
+
+def _elements(result: KitResult) -> Iterator[dict[str, Any]]:
+    parts = parts_list_of(result)
+    stages = [stage for stage in STAGES if stage in result.stages]
+    for n, placed in enumerate(parts.designs):
+        values = {"input": placed.design.parameters}
+        values |= {
+            stage: outcome.q
+            for stage in stages
+            if isinstance(outcome := result.stages[stage].designs[n], Evaluation)
+        }
+        for piece in placed.pieces:
+            row = {
+                "design": placed.design.name,
+                "element": piece.element,
+                "kind": piece.kind,
+                "part": parts.label(piece),
+                "variant": piece.variant,
+            }
+            yield row | {
+                f"{stage}_{k}": q[parameter]
+                for stage, q in values.items()
+                for k, parameter in enumerate(piece.parameters, 1)
+            }
+
+
+def _joints(result: KitResult) -> Iterator[dict[str, Any]]:
+    for stage, _, design, outcome in _evaluations(result):
+        if isinstance(outcome, Evaluation):
+            state = outcome.equilibria[design.fitted_role.name].state
+            placed = outcome.fit.placement.apply(state.positions[design.joints])
+            for number, (x, distance) in enumerate(zip(placed, outcome.fit.distances), 1):
+                yield {
+                    "design": design.name,
+                    "stage": stage,
+                    "joint": number,
+                    "x": x[0],
+                    "y": x[1],
+                    "z": x[2],
+                    "distance": distance,
+                    "distance_percent": 100 * distance / outcome.fit.diagonal,
+                }
+
+
+def _rods(result: KitResult) -> Iterator[dict[str, Any]]:
+    for design, outcome in zip(result.designs, result.stages["assigned"].designs):
+        if not isinstance(outcome, Evaluation):
+            continue
+        for role, strength in design_strength(design, outcome.equilibria).items():
+            fields = element_fields(design.scene(role), outcome.equilibria[role], strength)
+            for number, values in enumerate(zip(*fields.values())):
+                plain = {
+                    name: v.item() if isinstance(v, np.generic) else v
+                    for name, v in zip(fields, values)
+                }
+                yield {"design": design.name, "state": role, "rod_element": number} | plain
+
+
+def _steps(result: KitResult) -> Iterator[dict[str, Any]]:
+    for event in result.events:
+        figures = asdict(event.record)
+        seconds = {f"seconds_{phase}": value for phase, value in figures.pop("seconds").items()}
+        terms = {f"term_{name}": value for name, value in event.terms.items()}
+        yield (
+            {"stage": event.stage, "sqp": event.sqp, "weight": event.weight}
+            | figures
+            | terms
+            | seconds
+        )

@@ -1,0 +1,183 @@
+"""Documents of this project: JSON objects with a format name and a version, checked by their JSON
+Schema."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from ..errors import InputError
+
+_LONGEST = 160  # characters of a message that quotes what it found
+LARGEST = 1e60  # of numbers, whose powers stay within double precision
+_PREFIX = "urn:kop_exudyn:"
+_TYPES = {
+    "object": "an object",
+    "array": "a list",
+    "string": "a text",
+    "number": "a number",
+    "integer": "an integer",
+    "boolean": "true or false",
+    "null": "null",
+}
+
+
+def check_envelope(data: Any, name: str, version: int, source: Any = None) -> None:
+    """Raise InputError unless the data is an object {"format": "kop_exudyn/NAME", "version": ...}
+    that we can read."""
+    format_name = f"kop_exudyn/{name}"
+    if not isinstance(data, Mapping):
+        raise InputError(f"expected an object of the format {format_name!r}", source=source)
+    if data.get("format") != format_name:
+        raise InputError(
+            f"not a {name} file: expected {format_name!r}",
+            source=source,
+            field="format",
+            value=data.get("format", "(missing)"),
+        )
+    given = data.get("version")
+    if isinstance(given, bool) or not isinstance(given, int) or given < 1:
+        known = "1" if version == 1 else f"1 to {version}"
+        raise InputError(
+            f"unknown version; this kop_exudyn reads {known}",
+            source=source,
+            field="version",
+            value="(missing)" if given is None else given,
+        )
+    if given > version:
+        raise InputError(
+            f"written for a newer kop_exudyn; this one reads versions up to {version}: upgrade "
+            f"with "
+            "pip install --upgrade kop_exudyn",
+            source=source,
+            field="version",
+            value=given,
+        )
+
+
+def check_schema(data: Any, schema: str, source: Any = None) -> None:
+    """Raise InputError, with the field and the value that are wrong, unless the data meets a
+    schema.
+
+    schema : name, as `has_schema` knows it
+    """
+    from jsonschema.exceptions import best_match
+
+    error = best_match(_validator(schema).iter_errors(data))
+    if error is not None:
+        raise _as_input_error(error, source)
+
+
+def check_range(data: Any, source: Any = None) -> None:
+    """Raise InputError for a number beyond 1e60, whose powers would leave the range of double
+    precision."""
+    waiting: list[tuple[list[str | int], Any]] = [([], data)]
+    while waiting:
+        path, value = waiting.pop()
+        if isinstance(value, Mapping):
+            waiting += [([*path, key], item) for key, item in value.items()]
+        elif isinstance(value, list):
+            waiting += [([*path, k], item) for k, item in enumerate(value)]
+        elif isinstance(value, (int, float)) and not -LARGEST <= value <= LARGEST:
+            raise InputError(
+                "is out of range", source=source, field=dotted(path), value=_shown(value)
+            )
+
+
+def _shown(value: int | float) -> str | float:
+    """The number, or words for an integer, which has more than sixty digits here."""
+    return value if isinstance(value, float) else f"an integer of {len(str(abs(value)))} digits"
+
+
+def has_schema(schema: str) -> bool:
+    """Whether there is a schema of that name: NAME.schema.json beside this module or among the
+    structure classes."""
+    return schema in _schemas()
+
+
+@cache
+def _schemas() -> dict[str, dict]:
+    """All schemas by name."""
+    found = {}
+    package = files(__package__.rpartition(".")[0])
+    classes = [folder for folder in (package / "structures").iterdir() if folder.is_dir()]
+    for folder in (package / "io" / "schemas", *classes):
+        for entry in folder.iterdir():
+            if entry.name.endswith(".schema.json"):
+                found[entry.name.removesuffix(".schema.json")] = json.loads(
+                    entry.read_text(encoding="utf-8")
+                )
+    return found
+
+
+@cache
+def _validator(schema: str) -> Any:
+    from jsonschema import Draft202012Validator
+    from referencing import Registry
+    from referencing.jsonschema import DRAFT202012
+
+    registry = Registry().with_resources(
+        (_PREFIX + name, DRAFT202012.create_resource(content))
+        for name, content in _schemas().items()
+    )
+    return Draft202012Validator({"$ref": _PREFIX + schema}, registry=registry)
+
+
+def _as_input_error(error: Any, source: Any) -> InputError:
+    """Our words for a violation that jsonschema found."""
+    path = list(error.absolute_path)
+    if error.validator == "required":
+        missing = next(name for name in error.validator_value if name not in error.instance)
+        return InputError("is missing", source=source, field=dotted([*path, missing]))
+    if error.validator in ("additionalProperties", "unevaluatedProperties"):
+        known = sorted(_known_fields(error))
+        unknown = next(name for name in error.instance if name not in known)
+        near = difflib.get_close_matches(unknown, known, 1)
+        hint = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(known)}"
+        return InputError(f"unknown field ({hint})", source=source, field=dotted([*path, unknown]))
+    return InputError(
+        _message(error), source=source, field=dotted(path) or None, value=error.instance
+    )
+
+
+def _message(error: Any) -> str:
+    limit = error.validator_value
+    if error.validator == "type":
+        types = [limit] if isinstance(limit, str) else limit
+        return f"must be {' or '.join(_TYPES[name] for name in types)}"
+    if error.validator == "const":
+        return f"must be {json.dumps(limit)}"
+    if error.validator == "enum":
+        return f"must be one of {', '.join(map(json.dumps, limit))}"
+    if error.validator == "exclusiveMinimum":
+        return "must be positive" if limit == 0 else f"must be larger than {limit:g}"
+    if error.validator in ("minimum", "maximum"):
+        return f"must be at {'least' if error.validator == 'minimum' else 'most'} {limit:g}"
+    if error.validator in ("minItems", "maxItems"):
+        return (
+            f"must have at {'least' if error.validator == 'minItems' else 'most'} {limit} entries"
+        )
+    if error.validator == "minLength":
+        return "must not be empty"
+    return error.message if len(error.message) <= _LONGEST else f"{error.message[:_LONGEST]}..."
+
+
+def _known_fields(error: Any) -> set[str]:
+    """Names that the schema at the error allows, those of the schemas it refers to included."""
+    schema = error.schema
+    names = set(schema.get("properties", {}))
+    for part in schema.get("allOf", ()):
+        referred = _schemas().get(part.get("$ref", "").removeprefix(_PREFIX), {})
+        names |= set(referred.get("properties", {}))
+    return names
+
+
+def dotted(path: list[str | int]) -> str:
+    """``curves[3].points`` for ["curves", 3, "points"]."""
+    return "".join(
+        f"[{step}]" if isinstance(step, int) else f".{step}" for step in path
+    ).removeprefix(".")

@@ -1,0 +1,119 @@
+"""JSON: read strictly, written readably and without values that other programs can't read."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+
+from ..errors import InputError
+from .files import read_bytes, write_text
+
+# Our documents are at most ten levels deep; this is short of what would exhaust Python's stack.
+MAX_DEPTH = 100
+
+# An innermost list without strings, as json.dumps spreads it over lines.
+_FLAT_LIST = re.compile(r'\[\n\s+([^\[\]{}"]*?)\n\s*\]')
+_LINE_END = re.compile(r"\n\s+")
+
+
+def read_json(path: str | Path) -> Any:
+    """The content of a JSON file, which may be gzipped.
+
+    Raises InputError for unreadable files, for bytes that aren't UTF-8 and for what Python's reader
+    would let pass: NaN and Infinity, numbers beyond double precision's range, a key twice in one
+    object, excessive nesting.
+    """
+    content = read_bytes(path)
+    try:
+        text = content.decode("utf-8-sig")  # some editors start a file with a byte-order mark
+    except UnicodeDecodeError as error:
+        raise InputError(f"not UTF-8 text (byte {error.start})", source=path) from None
+    return parse_json(text, source=path)
+
+
+def parse_json(text: str, source: Any = None) -> Any:
+    """`read_json` for text at hand; `source` is named in errors."""
+    try:
+        value = json.loads(
+            text,
+            parse_constant=_refuse_constant,
+            parse_float=_finite,
+            object_pairs_hook=_without_duplicates,
+        )
+        if not _shallower_than(value, MAX_DEPTH):
+            raise RecursionError
+    except json.JSONDecodeError as error:
+        raise InputError(
+            f"not JSON: line {error.lineno}, column {error.colno}: {error.msg}", source=source
+        ) from None
+    except RecursionError:
+        raise InputError(f"nested more than {MAX_DEPTH} levels deep", source=source) from None
+    except InputError as error:
+        raise error.at(source) from None
+    except ValueError:  # an integer of thousands of digits
+        raise InputError("contains a number with too many digits", source=source) from None
+    return value
+
+
+def write_json(path: str | Path, value: Any, *, overwrite: bool = False) -> Path:
+    """Write plain data, numpy's arrays and numbers included, as `to_json` does. Raises InputError
+    as `write_bytes`."""
+    return write_text(path, to_json(value), overwrite=overwrite)
+
+
+def to_json(value: Any) -> str:
+    """Indented JSON text with a final line end; keys in the given order, lists of numbers on one
+    line, NaN as null."""
+    text = json.dumps(plain(value), indent=2, ensure_ascii=False, allow_nan=False)
+    return _FLAT_LIST.sub(lambda found: f"[{_LINE_END.sub(' ', found[1])}]", text) + "\n"
+
+
+def plain(value: Any) -> Any:
+    """The same data in JSON's own types: tuples and arrays as lists, numbers that aren't finite as
+    None."""
+    if isinstance(value, (np.ndarray, np.generic)):
+        value = value.tolist()
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, Path):
+        return value.as_posix()
+    return value
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise InputError(f"{name} is not a number that JSON knows")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise InputError(f"the number {text} is out of range")
+    return value
+
+
+def _without_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    result = dict(pairs)
+    if len(result) < len(pairs):
+        keys = [key for key, _ in pairs]
+        raise InputError(
+            "is given twice in one object", field=next(k for k in keys if keys.count(k) > 1)
+        )
+    return result
+
+
+def _shallower_than(value: Any, depth: int) -> bool:
+    if isinstance(value, dict):
+        value = list(value.values())
+    if not isinstance(value, list):
+        return True
+    return depth > 0 and all(_shallower_than(item, depth - 1) for item in value)

@@ -1,1 +1,0 @@
-"""Tools that try to break the reading and writing of files: damaged copies of every kind, and killed processes."""

@@ -1,0 +1,23 @@
+"""Elements of a kind, by where their parameters stand: all that a kit needs to know of a design."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class ElementGroup:
+    """Elements of one kind and one number of parameters.
+
+    kind : name of the part kind that serves them ("linear", "angular", "cell", ...)
+    indices : (n, k) int, where the k parameters of each element stand in the design's parameters q
+    """
+
+    kind: str
+    indices: np.ndarray
+
+    def shifted(self, offset: int) -> ElementGroup:
+        """The same elements in a longer parameter vector (several designs after each other)."""
+        return ElementGroup(self.kind, self.indices + offset)

@@ -1,0 +1,316 @@
+"""The assigned stage in rounds: other parts for the elements where the objective gains by them,
+then the parts' SQP."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+
+import numpy as np
+
+from ..errors import SimulationFailure
+from .objective import DesignDerivatives, Evaluation
+from .reassign import LocalModel, Reassignment, reassign
+from .stage_results import SAME_STATE, StageResult, distance, mixed
+from .stages import Stages
+
+log = logging.getLogger(__name__)
+
+# How far the model reaches is known only after a trial, and a trial costs little next to an SQP:
+# try several.
+_DAMPINGS = (1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5)
+_TRIALS = 3  # of a kind, those by which no element changes aside
+# a design that ends above its prediction by this share of the promised gain keeps its parts at
+# first
+_MISLED = 0.1
+# the SQP has to show what a trial is worth, unless J is larger than before by this factor
+_PATIENCE = 1.1
+_FAR_OFF = 2.0  # times J
+_REPEATS = 4  # reassignments before an SQP
+_BOLD = 0.01  # of the elements get other parts in a leap, at least
+_BOLD_DAMPINGS = (*_DAMPINGS, 1e-6, 1e-7, 0.0)
+_AFTER_LEAP = 2  # rounds at most
+# of J: another reassignment comes before the SQP while they lower it by this factor
+_WORTHWHILE = 0.97
+
+# what came of a reassignment, and the damping of its model
+_Trial = tuple[StageResult, Reassignment, float]
+
+
+def in_rounds(
+    stages: Stages,
+    start: StageResult,
+    fixed_kit: bool = False,
+    numbers: Iterator[int] | None = None,
+) -> StageResult:
+    """Reassign and optimise in turns until neither gains, from a state in which every element is
+    its part; then leap.
+
+    What the rounds end in is a local minimum, and there are many. A leap gives more elements other
+    parts than the model can be trusted with, so that J rises at first; of where the rounds lead
+    from there the better one is kept (iterated local search: Lourenço, Martin, Stützle 2003).
+
+    fixed_kit : keep the parts (projection onto an existing kit), only the assignment changes
+    numbers : of the rounds, where this isn't the first call: every SQP has a name of its own
+    """
+    settings = stages.settings
+    if settings.reassignments == 0:
+        name = "assigned" if numbers is None else f"assigned-{next(numbers)}"
+        return start if fixed_kit else stages.assigned(start, name)
+    rounds = _Rounds(stages, fixed_kit, numbers or count(1), start.steps)
+    best = rounds.settled(start, settings.reassignments)
+    leaps = settings.leaps
+    while leaps > 0 and best.value is not None:
+        for trial in _bold_trials(stages, best, fixed_kit)[:leaps]:
+            leaps -= 1
+            landed = rounds.settled(rounds.landed(trial), _AFTER_LEAP)
+            log.info("a leap ends at J = %.5g, from %.5g", _value(landed), best.value)
+            if _value(landed) < best.value:
+                leaps = leaps if rounds.worthwhile(best, landed) else 0
+                best = landed
+                break
+        else:
+            break
+    return replace(rounds.polished(best), steps=rounds.steps, jumps=start.jumps)
+
+
+def that_open(stages: Stages, start: StageResult, fixed_kit: bool = False) -> StageResult:
+    """Designs that open into their shape by themselves, or nearly: rounds from where they open
+    into, again and again.
+
+    The states of the assigned stage are led to from the relaxed ones. Opened from its assembly, a
+    design may end in another stable state; with rounds from there, the optimisation works on the
+    states that a builder will find. Of all results the one is returned whose designs, opened from
+    their assembly, have the lowest J.
+    """
+    settings = stages.settings
+    best, best_value = start, np.inf
+    result, numbers = start, count(2 + settings.reassignments + settings.leaps * (1 + _AFTER_LEAP))
+    for number in range(settings.redeployments + 1):
+        found = stages.redeployed(result)
+        opened = stages.judged(replace(result, designs=found))
+        if _value(opened) < best_value or number == 0:
+            best, best_value = result, _value(opened)
+        if (
+            number == settings.redeployments
+            or opened.value is None
+            or _all_same(stages, result, opened)
+        ):
+            break
+        opened = stages.confirmed(opened)
+        if opened.value is None:
+            break
+        result = in_rounds(stages, opened, fixed_kit, numbers)
+    return replace(best, jumps=start.jumps)
+
+
+@dataclass
+class _Rounds:
+    """Rounds with numbers, and the steps of their SQPs (those of rounds that are undone
+    included)."""
+
+    stages: Stages
+    fixed_kit: bool
+    numbers: Iterator[int]
+    steps: int
+
+    def settled(self, best: StageResult, rounds: int) -> StageResult:
+        """Reassigned and optimised in so many rounds at most, as long as they gain."""
+        for number in range(rounds):
+            result = _many_reassigned(self.stages, best, self.fixed_kit)
+            if result is best and (self.fixed_kit or number > 0):
+                break
+            result = self._optimised(result)
+            last, best = best, min((best, result), key=_value)
+            if not self.worthwhile(last, best):
+                break
+        return best
+
+    def worthwhile(self, last: StageResult, best: StageResult) -> bool:
+        """Whether J fell by so much that another round may gain as well."""
+        allowed = self.stages.settings.reassigned_tolerance
+        return not np.isfinite(_value(last)) or _value(last) - _value(best) >= allowed * _value(
+            last
+        )
+
+    def landed(self, trial: StageResult) -> StageResult:
+        """The parts brought to a new assignment, roughly: the elements get other parts next."""
+        return self._optimised(trial, (self.stages.settings.round_steps + 1) // 2)
+
+    def polished(self, best: StageResult) -> StageResult:
+        """The parts brought to the minimum, to the tolerance asked for."""
+        settings = self.stages.settings
+        result = self._optimised(best, settings.round_steps, settings.assigned_tolerance)
+        return min((best, result), key=_value)
+
+    def _optimised(
+        self, result: StageResult, max_steps: int | None = None, tolerance: float | None = None
+    ) -> StageResult:
+        if self.fixed_kit:
+            return result
+        settings = self.stages.settings
+        result = self.stages.assigned(
+            result,
+            f"assigned-{next(self.numbers)}",
+            max_steps or settings.round_steps,
+            tolerance or settings.round_tolerance,
+        )
+        self.steps += result.steps
+        return result
+
+
+def _all_same(stages: Stages, led: StageResult, opened: StageResult) -> bool:
+    return all(
+        distance(design, a, b) <= SAME_STATE
+        for design, a, b in zip(stages.dataset.designs, led.designs, opened.designs)
+        if isinstance(a, Evaluation) and isinstance(b, Evaluation)
+    )
+
+
+def _many_reassigned(stages: Stages, best: StageResult, fixed_kit: bool) -> StageResult:
+    """Reassigned again and again while that alone gains: each time costs less than the SQP that
+    follows."""
+    for _ in range(_REPEATS):
+        trial = _best_trial(stages, best, fixed_kit)
+        if trial is None:
+            break
+        enough = _value(trial) > _WORTHWHILE * _value(best)
+        best = trial
+        if enough:
+            break
+    return best
+
+
+def _best_trial(stages: Stages, best: StageResult, fixed_kit: bool) -> StageResult | None:
+    """The best of several reassignments, None where none is worth an SQP (with a fixed kit: none is
+    better)."""
+    if best.value is None:  # a design failed: there is no model of it
+        return None
+    derivatives = stages.dataset.derivatives(best.evaluations, hessian=True)
+    trials = [_each_its_own(stages, best, derivatives)]
+    if not fixed_kit:
+        trials += _together(stages, best, derivatives)
+    found = [trial for trial in trials if trial is not None]
+    if not found or _value(trial := min(found, key=_value)) >= _PATIENCE * best.value:
+        return None
+    trial = stages.confirmed(trial)
+    return trial if trial.value is not None else None
+
+
+def _each_its_own(
+    stages: Stages, best: StageResult, derivatives: Sequence[DesignDerivatives]
+) -> StageResult | None:
+    """With the parts as they are the designs don't depend on each other: each takes the best of its
+    trials, if any."""
+    results = [best, *(trial for trial, _, _ in _several(stages, best, derivatives, True))]
+    chosen = [min(results, key=lambda result: _share(result, n)) for n in range(len(best.designs))]
+    return (
+        None
+        if all(result is best for result in chosen)
+        else stages.judged(mixed(chosen, stages.dataset))
+    )
+
+
+def _together(
+    stages: Stages, best: StageResult, derivatives: Sequence[DesignDerivatives]
+) -> list[StageResult]:
+    """Trials in which the parts move along; the best one also without the designs that the model
+    was wrong about."""
+    found = _several(stages, best, derivatives, False)
+    if found:
+        trial, changed, damping = min(found, key=lambda t: _value(t[0]))
+        misled = _misled(stages, best, trial, changed)
+        if misled and len(misled) < len(best.designs):
+            found += [t] if (t := _trial(stages, best, derivatives, damping, misled)) else []
+    return [trial for trial, _, _ in found]
+
+
+def _several(
+    stages: Stages, best: StageResult, derivatives: Sequence[DesignDerivatives], fixed_kit: bool
+) -> list[_Trial]:
+    """The most cautious trials in which anything changes, up to one that is far off: bolder ones
+    rarely are better."""
+    found: list[_Trial] = []
+    for damping in _DAMPINGS:
+        trial = _trial(stages, best, derivatives, damping, (), fixed_kit)
+        found += [trial] if trial is not None else []
+        if (
+            len(found) == _TRIALS
+            or trial is not None
+            and _value(trial[0]) > _FAR_OFF * _value(best)
+        ):
+            break
+    return found
+
+
+def _bold_trials(stages: Stages, best: StageResult, fixed_kit: bool) -> list[StageResult]:
+    """Some trials in which many elements change, however J takes it; the best one first."""
+    derivatives = stages.dataset.derivatives(best.evaluations, hessian=True)
+    fewest = max(2.0, _BOLD * sum(design.n_elements for design in stages.dataset.designs))
+    found: list[StageResult] = []
+    for damping in _BOLD_DAMPINGS:
+        trial = _trial(stages, best, derivatives, damping, (), fixed_kit)
+        if trial is not None and trial[1].changes >= fewest and trial[0].value is not None:
+            found.append(trial[0])
+        if len(found) == _TRIALS:
+            break
+    confirmed = [stages.confirmed(trial) for trial in sorted(found, key=_value)]
+    return [trial for trial in confirmed if trial.value is not None]
+
+
+def _trial(
+    stages: Stages,
+    best: StageResult,
+    derivatives: Sequence[DesignDerivatives],
+    damping: float,
+    frozen: Sequence[int] = (),
+    fixed_kit: bool = False,
+) -> _Trial | None:
+    """The designs rebuilt of the parts that the model prefers; None where it prefers those that
+    they have."""
+    dataset = stages.dataset
+    model = LocalModel.of(
+        derivatives, dataset.design_weights, dataset.split(dataset.scales()), damping
+    )
+    found = reassign(
+        stages.assigned_problem(best, range(len(best.designs))), model, frozen, fixed_kit
+    )
+    if found is None:
+        return None
+    # nobody looks for snaps here, and J tells what came of them
+    path_steps = (stages.settings.path_steps + 1) // 2
+    trial = stages.built_from(found.kit, found.assignment, best.evaluations, found.free, path_steps)
+    log.info(
+        "other parts for %d elements (damping %g%s): J = %.5g, predicted %.5g",
+        found.changes,
+        damping,
+        ", same kit" if fixed_kit else "",
+        _value(trial),
+        best.value + found.predicted.sum(),
+    )
+    return trial, found, damping
+
+
+def _value(result: StageResult) -> float:
+    return np.inf if result.value is None else result.value
+
+
+def _share(result: StageResult, design: int) -> float:
+    outcome = result.designs[design]
+    return outcome.value if isinstance(outcome, Evaluation) else np.inf
+
+
+def _misled(
+    stages: Stages, best: StageResult, trial: StageResult, found: Reassignment
+) -> list[int]:
+    """The designs that the model was wrong about: those that ended far above what it promised."""
+    allowed = _MISLED * abs(found.predicted.sum())
+    weights = stages.dataset.design_weights
+    return [
+        n
+        for n, (old, new) in enumerate(zip(best.evaluations, trial.designs))
+        if isinstance(new, SimulationFailure)
+        or weights[n] * (new.value - old.value) > found.predicted[n] + allowed
+    ]

@@ -1,0 +1,265 @@
+"""Several designs that share a kit: one long parameter vector, and their evaluation side by
+side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ..equilibrium.newton import Equilibrium
+from ..errors import InputError, SimulationFailure
+from ..kit.groups import ElementGroup
+from ..kit.kinds import Bounds, part_kind
+from ..scene.state import State
+from ..structures.base import Design
+from .objective import DesignDerivatives, Evaluation, Reference, Weights
+from .pool import DesignPool
+
+_EQUILIBRIUM_NUMBERS = ("torque", "elastic_energy", "potential", "residual")
+
+
+@dataclass
+class Tally:
+    """What a run has cost so far: equilibria solved, and Newton iterations in them."""
+
+    equilibria: int = 0
+    newton_iterations: int = 0
+
+    def add(self, evaluation: Evaluation) -> None:
+        self.equilibria += evaluation.solves
+        self.newton_iterations += evaluation.iterations
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """Designs with their parameters after each other.
+
+    pool : solves them
+    weights : of the objective
+    numbers : which of the pool's designs
+    design_weights : how much each of these counts
+    tally : counts what was solved
+    """
+
+    pool: DesignPool
+    weights: Weights
+    numbers: tuple[int, ...]
+    design_weights: tuple[float, ...]
+    tally: Tally = field(default_factory=Tally)
+
+    @classmethod
+    def of_pool(
+        cls, pool: DesignPool, weights: Weights, design_weights: Sequence[float] | None = None
+    ) -> Dataset:
+        """All designs of a pool."""
+        n = len(pool.designs)
+        return cls(
+            pool,
+            weights,
+            tuple(range(n)),
+            tuple(design_weights) if design_weights is not None else (1.0,) * n,
+        )
+
+    def subset(self, members: Sequence[int]) -> Dataset:
+        """Some of the designs, by their place in this dataset; counts on in the same tally."""
+        return replace(
+            self,
+            numbers=tuple(self.numbers[k] for k in members),
+            design_weights=tuple(self.design_weights[k] for k in members),
+        )
+
+    @property
+    def designs(self) -> list[Design]:
+        return [self.pool.designs[n] for n in self.numbers]
+
+    @property
+    def references(self) -> list[Reference]:
+        return [self.pool.references[n] for n in self.numbers]
+
+    @property
+    def offsets(self) -> np.ndarray:
+        """(n_designs + 1,) where each design's parameters start."""
+        return np.cumsum([0] + [len(d.parameters) for d in self.designs])
+
+    @property
+    def groups(self) -> list[ElementGroup]:
+        """All elements, indexing the long parameter vector; design by design."""
+        return [
+            g.shifted(offset) for d, offset in zip(self.designs, self.offsets) for g in d.groups
+        ]
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """(n_q,) the inputs' parameters."""
+        return np.concatenate([d.parameters for d in self.designs])
+
+    @property
+    def free(self) -> np.ndarray:
+        """(k,) places in the long vector that belong to no element, see `Design.free`."""
+        return np.concatenate(
+            [d.free + offset for d, offset in zip(self.designs, self.offsets)]
+        ).astype(int)
+
+    def split(self, q: np.ndarray) -> list[np.ndarray]:
+        """The designs' own parts of the long vector."""
+        return np.split(q, self.offsets[1:-1])
+
+    def scales(self) -> np.ndarray:
+        """(n_q,) typical size of every parameter: the kind's scale, or the design's for those of no
+        element."""
+        q = self.parameters
+        out = np.concatenate(
+            [np.full(len(d.parameters), float(d.free_scale)) for d in self.designs]
+        )
+        for kind in {g.kind for g in self.groups}:
+            indices = np.concatenate([g.indices.ravel() for g in self.groups if g.kind == kind])
+            out[indices] = part_kind(kind).scale(q[indices])
+        return out
+
+    def bounds(self, bounds: Bounds | None) -> tuple[np.ndarray, np.ndarray]:
+        """(n_q,), (n_q,): the designs' own bounds, narrowed by the user's (kind -> lower, upper).
+
+        The user's bounds are those of parts, so an angular element may have either sign within
+        them.
+        """
+        lower = np.concatenate([d.lower for d in self.designs])
+        upper = np.concatenate([d.upper for d in self.designs])
+        for group in self.groups:
+            if not bounds or group.kind not in bounds:
+                continue
+            kind = part_kind(group.kind)
+            low, high = kind.bounds(bounds)
+            if kind.angular:
+                low, high = -high, high
+            else:
+                # an element may be realised mirrored: each of its lengths must suit one side of a
+                # part
+                low, high = np.full_like(low, low.min()), np.full_like(high, high.max())
+            columns = group.indices.shape[1]
+            lower[group.indices] = np.maximum(lower[group.indices], low[:columns])
+            upper[group.indices] = np.minimum(upper[group.indices], high[:columns])
+        if (lower > upper).any():
+            worst = int(np.argmax(lower - upper))
+            raise InputError(
+                "bounds exclude each other",
+                field=f"bounds of parameter {worst}",
+                value=(float(lower[worst]), float(upper[worst])),
+            )
+        return lower, upper
+
+    def evaluate(self, q: np.ndarray, previous: Sequence[Evaluation] | None) -> list[Evaluation]:
+        """All designs at q, solving only those whose parameters changed. Raises the first
+        SimulationFailure."""
+        parts = self.split(q)
+        results: list[Any] = [None] * len(parts)
+        calls = {}
+        for n, part in enumerate(parts):
+            if previous is not None and np.array_equal(part, previous[n].q):
+                results[n] = previous[n]
+            else:
+                calls[n] = (part, None if previous is None else previous[n])
+        for n, result in self._map("evaluate", calls).items():
+            results[n] = result
+            if isinstance(result, Evaluation):
+                self.tally.add(result)
+        return _all_or_raise(results)
+
+    def derivatives(
+        self, evaluations: Sequence[Evaluation], hessian: bool
+    ) -> list[DesignDerivatives]:
+        """Confirmed evaluations and their derivatives."""
+        calls = {n: (evaluation, hessian) for n, evaluation in enumerate(evaluations)}
+        return _all_or_raise(list(self._map("derivatives", calls).values()))
+
+    def follow(
+        self, q: np.ndarray, previous: Sequence[Evaluation], steps: int
+    ) -> list[list[Evaluation] | SimulationFailure]:
+        """Straight paths of all designs to q; a design that fails on its way comes back as its
+        failure."""
+        calls = {n: (part, previous[n], steps) for n, part in enumerate(self.split(q))}
+        results = list(self._map("follow", calls).values())
+        for path in results:
+            for evaluation in path if isinstance(path, list) else ():
+                self.tally.add(evaluation)
+        return results
+
+    def confirm(
+        self, evaluations: Mapping[int, Evaluation]
+    ) -> dict[int, Evaluation | SimulationFailure]:
+        """Exudyn's word on some designs."""
+        return self._map("confirm", {n: (e,) for n, e in evaluations.items()})
+
+    def redeploy(
+        self, q: np.ndarray, members: Sequence[int]
+    ) -> dict[int, Evaluation | SimulationFailure]:
+        """Some designs deployed at q from their own starting geometry, without a warm start."""
+        parts = self.split(q)
+        found = self._map("redeploy", {n: (parts[n],) for n in members})
+        for evaluation in found.values():
+            if isinstance(evaluation, Evaluation):
+                self.tally.add(evaluation)
+        return found
+
+    def judge(self, calls: dict[int, tuple]) -> dict[int, Any]:
+        """Evaluations of given parameters and equilibria, (q, {role: equilibrium}) a design."""
+        return self._map("judge", calls)
+
+    def _map(self, method: str, calls: dict[int, tuple]) -> dict[int, Any]:
+        numbered = self.pool.map(
+            method, self.weights, {self.numbers[n]: call for n, call in calls.items()}
+        )
+        return dict(zip(calls, numbered.values()))
+
+    def value(self, evaluations: Sequence[Evaluation]) -> float:
+        """Weighted sum of the designs' F."""
+        return float(sum(w * e.value for w, e in zip(self.design_weights, evaluations)))
+
+
+def _all_or_raise(results: list[Any]) -> list[Any]:
+    for result in results:
+        if isinstance(result, SimulationFailure):
+            raise result
+    return results
+
+
+def evaluations_to_arrays(evaluations: Sequence[Evaluation]) -> dict[str, np.ndarray]:
+    """The equilibria of evaluations as plain arrays, from which `evaluations_from_arrays` makes the
+    same ones."""
+    arrays: dict[str, np.ndarray] = {}
+    for n, evaluation in enumerate(evaluations):
+        arrays[f"{n}/q"] = evaluation.q
+        for role, eq in evaluation.equilibria.items():
+            for name, value in {**eq.state.to_arrays(), "stress": eq.stress}.items():
+                arrays[f"{n}/{role}/{name}"] = value
+            opening = np.nan if eq.opening is None else eq.opening
+            numbers = [getattr(eq, name) for name in _EQUILIBRIUM_NUMBERS]
+            arrays[f"{n}/{role}/numbers"] = np.array([opening, *numbers])
+    return arrays
+
+
+def evaluations_from_arrays(dataset: Dataset, arrays: Mapping[str, np.ndarray]) -> list[Evaluation]:
+    """The evaluations that the arrays came from, judged anew (no equilibrium is solved)."""
+    calls = {}
+    for n, design in enumerate(dataset.designs):
+        equilibria = {}
+        for role in design.roles:
+            prefix = f"{n}/{role.name}/"
+            opening, *numbers = arrays[prefix + "numbers"].tolist()
+            state = State(
+                *(np.array(arrays[prefix + key]) for key in ("positions", "rotations", "angles"))
+            )
+            equilibria[role.name] = Equilibrium(
+                state=state,
+                q=np.array(arrays[f"{n}/q"]),
+                opening=None if np.isnan(opening) else opening,
+                stress=np.array(arrays[prefix + "stress"]),
+                iterations=0,
+                escapes=0,
+                wall_s=0.0,
+                **dict(zip(_EQUILIBRIUM_NUMBERS, numbers)),
+            )
+        calls[n] = (np.array(arrays[f"{n}/q"]), equilibria)
+    return _all_or_raise(list(dataset.judge(calls).values()))

@@ -1,0 +1,74 @@
+"""Fits one design's own parameters to its target, before any kit: inputs that are off their target
+blame the kit."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..kit.kinds import part_kind
+from ..sqp.constraints import LinearConstraints
+from ..sqp.problem import Derivatives, Point
+from ..sqp.solver import SQPOptions, minimise
+from ..structures.base import Design
+from .objective import DesignObjective, Evaluation, Weights
+
+
+class OwnProblem:
+    """F(q) of one design over all its parameters, within its bounds and perhaps narrower ones.
+
+    A point's data is a list of the one evaluation there, which Exudyn's replaces once derivatives
+    are taken.
+    """
+
+    def __init__(self, objective: DesignObjective, lower: Any = -np.inf, upper: Any = np.inf):
+        self.objective, design = objective, objective.design
+        self.lower, self.upper = np.maximum(design.lower, lower), np.minimum(design.upper, upper)
+        self.n = len(design.parameters)
+        self.constraints = LinearConstraints.none(self.n)
+        self.scale = np.full(self.n, float(design.free_scale))
+        for group in design.groups:
+            self.scale[group.indices] = part_kind(group.kind).scale(
+                design.parameters[group.indices.ravel()]
+            )
+
+    def evaluate(self, x: np.ndarray, previous: Point | None) -> Point:
+        return self.point(
+            self.objective.evaluate(x, previous.data[0] if previous is not None else None)
+        )
+
+    def point(self, evaluation: Evaluation) -> Point:
+        """The point of a given evaluation."""
+        return Point(evaluation.q, evaluation.value, [evaluation])
+
+    def derivatives(self, point: Point) -> Derivatives:
+        found = self.objective.derivatives(point.data[0])
+        point.data[0] = found.evaluation
+        return Derivatives(found.gradient, sp.csc_matrix(found.hessian))
+
+
+def fit_input(
+    design: Design,
+    weights: Weights | None = None,
+    *,
+    lower: Any = -np.inf,
+    upper: Any = np.inf,
+    max_steps: int = 30,
+    tolerance: float = 1e-3,
+) -> Evaluation:
+    """The design's parameters of least F, from its input parameters; confirmed by Exudyn.
+
+    weights : of fit and energy, default: the fit weight of the design's class
+    lower, upper : (nq,) or one number each, besides the design's own bounds
+    tolerance : steps that promise or gain less than this share of F are the last
+
+    Raises InputError for bounds that exclude each other, SimulationFailure when the input can't be
+    simulated.
+    """
+    objective = DesignObjective(design, weights or Weights(fit=design.fit_weight))
+    problem = OwnProblem(objective, lower, upper)
+    start = np.clip(design.parameters, problem.lower, problem.upper)
+    result = minimise(problem, start, SQPOptions(max_steps=max_steps, decrease_tolerance=tolerance))
+    return objective.confirm(result.point.data[0])

@@ -1,0 +1,280 @@
+"""Design preservation: how far a design with changed parameters is from the design that was wanted.
+
+F(q) = beta T / l0^2 + gamma sum_roles E / E0 + ..., with T the target fitting of the deployed
+joints at the best rigid placement, E the elastic energies (deployed, and assembled where the class
+has such a state), l0 the target's bounding-box diagonal and E0 the input design's deployed energy:
+every term is divided by its own scale, so F doesn't change with units. The terms are the modules of
+`terms/`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from ..equilibrium.exudyn_model import Confirmation, ExudynModel
+from ..equilibrium.newton import Equilibrium, NewtonOptions, Start, refine, solve
+from ..equilibrium.sensitivities import Sensitivities
+from ..errors import InputError, SimulationFailure
+from ..structures.base import Design
+from ..structures.fitting import FitResult, TargetFitting
+from .terms.base import Reference, term_class
+
+# A trial point that takes longer than this is better met by a shorter step.
+_TRIAL = NewtonOptions(max_iterations=80)
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Weights of the objective's terms; a term of weight zero is not computed.
+
+    fit : beta, on T / l0^2
+    energy : gamma, on E / E0
+    share : of the target positions in T; the rest is closest points
+    others : (name, weight) of other terms, see the modules of `terms/`; `Weights.of` takes all by
+        name
+
+    Raises InputError for unknown terms, and for weights that are negative or not finite.
+    """
+
+    fit: float = 1e4
+    energy: float = 0.02
+    share: float = 0.1
+    others: tuple[tuple[str, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        for name, weight in self.of_terms().items():
+            term_class(name)
+            if not (isinstance(weight, (int, float)) and 0 <= weight < float("inf")):
+                raise InputError(
+                    "a weight is a finite number, not negative",
+                    field=f"weights.{name}",
+                    value=weight,
+                )
+
+    @classmethod
+    def of(cls, values: Mapping[str, float]) -> Weights:
+        """Weights by the names of the terms (and "share"); those not given have their defaults."""
+        own = {name: values[name] for name in ("fit", "energy", "share") if name in values}
+        return cls(
+            **own,
+            others=tuple(
+                sorted((name, weight) for name, weight in values.items() if name not in own)
+            ),
+        )
+
+    @classmethod
+    def suiting(
+        cls, designs: Sequence[Design], values: Mapping[str, float] | None = None
+    ) -> Weights:
+        """Weights with the fit weight that suits the designs' class (see `Design.fit_weight`),
+        unless values say else."""
+        return cls.of({"fit": max(design.fit_weight for design in designs), **(values or {})})
+
+    def of_terms(self) -> dict[str, float]:
+        """Weights by the terms' names."""
+        return {"fit": self.fit, "energy": self.energy, **dict(self.others)}
+
+    def to_dict(self) -> dict[str, float]:
+        """What `of` takes."""
+        return {"fit": self.fit, "energy": self.energy, "share": self.share, **dict(self.others)}
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One design at one parameter vector.
+
+    q : (nq,)
+    value : F
+    terms : its weighted parts by name ("fit", "energy ROLE", ...)
+    fit : target fitting of the joints
+    equilibria : by role
+    confirmations : Exudyn's, by role; empty until the point is kept
+    iterations, solves : Newton iterations and equilibria that it took
+    """
+
+    q: np.ndarray
+    value: float
+    terms: Mapping[str, float]
+    fit: FitResult
+    equilibria: Mapping[str, Equilibrium]
+    confirmations: Mapping[str, Confirmation]
+    iterations: int
+    solves: int
+
+
+@dataclass(frozen=True)
+class DesignDerivatives:
+    """Gradient (nq,) and model Hessian (nq, nq; None when not asked for) of F, and the confirmed
+    evaluation.
+
+    seconds : by phase, for profiles
+    """
+
+    gradient: np.ndarray
+    hessian: np.ndarray | None
+    evaluation: Evaluation
+    seconds: Mapping[str, float]
+
+    @property
+    def model(self) -> np.ndarray:
+        """The Hessian, which must have been asked for."""
+        assert self.hessian is not None
+        return self.hessian
+
+
+class DesignObjective:
+    """F of one design, with the solver workspaces and Exudyn models that it needs, each made at
+    first use."""
+
+    def __init__(
+        self, design: Design, weights: Weights = Weights(), reference: Reference | None = None
+    ):
+        self.design, self.weights = design, weights
+        self.reference = reference if reference is not None else reference_of(design)
+        self._fitting = TargetFitting(self.reference.target, weights.share)
+        self._terms = [
+            (term_class(name)(design, self.reference), weight)
+            for name, weight in weights.of_terms().items()
+            if weight
+        ]
+        self._models: dict[str, ExudynModel] = {}
+
+    def evaluate(
+        self, q: np.ndarray, previous: Evaluation | None = None, options: NewtonOptions = _TRIAL
+    ) -> Evaluation:
+        """F at q, warm-started from a previous evaluation (default: the input design's equilibria).
+
+        Raises SimulationFailure, naming design and role, when an equilibrium isn't found.
+        """
+        starts = previous.equilibria if previous is not None else self.reference.equilibria
+        equilibria = {}
+        for role in self.design.roles:
+            try:
+                equilibria[role.name] = self._solve(
+                    role.name, q, starts[role.name], role.opening, options
+                )
+            except SimulationFailure as failure:
+                raise failure.within(f"{self.design.name}: {role.name} state") from None
+        return self.judge(q, equilibria)
+
+    def redeploy(self, q: np.ndarray) -> Evaluation:
+        """F at q, every role solved from the design's own starting geometry. May raise
+        SimulationFailure."""
+        try:
+            return self.judge(q, self.design.deploy(q))
+        except SimulationFailure as failure:
+            raise failure.within(self.design.name) from None
+
+    def derivatives(self, evaluation: Evaluation, hessian: bool = True) -> DesignDerivatives:
+        """Confirm the evaluation's states with Exudyn, then differentiate F at Exudyn's states."""
+        begin = perf_counter()
+        evaluation = self.confirm(evaluation)
+        exudyn_s = perf_counter() - begin
+        begin = perf_counter()
+        gradient = np.zeros(len(evaluation.q))
+        model = np.zeros((len(evaluation.q),) * 2) if hessian else None
+        for role in self.design.roles:
+            terms = [(term, weight) for term, weight in self._terms if term.sees(role)]
+            if not terms:
+                continue
+            sensitivities = Sensitivities(
+                self.design.systems[role.name], evaluation.equilibria[role.name]
+            )
+            for term, weight in terms:
+                if model is None:
+                    gradient += weight * term.gradient(role, sensitivities, evaluation.fit)
+                else:
+                    slope, curvature = term.model(role, sensitivities, evaluation.fit)
+                    gradient += weight * slope
+                    model += weight * curvature
+        seconds = {"exudyn": exudyn_s, "sensitivities": perf_counter() - begin}
+        return DesignDerivatives(gradient, model, evaluation, seconds)
+
+    def confirm(self, evaluation: Evaluation) -> Evaluation:
+        """The same evaluation at Exudyn's own solutions; SimulationFailure where Exudyn doesn't
+        confirm one."""
+        if evaluation.confirmations:
+            return evaluation
+        confirmations, equilibria = {}, {}
+        for role in self.design.roles:
+            if role.name not in self._models:
+                self._models[role.name] = ExudynModel(self.design.scene(role.name))
+            refined = refine(self.design.systems[role.name], evaluation.equilibria[role.name])
+            try:
+                confirmations[role.name] = self._models[role.name].confirm(refined)
+            except SimulationFailure as failure:
+                raise failure.within(f"{self.design.name}: {role.name} state") from None
+            equilibria[role.name] = replace(refined, state=confirmations[role.name].state)
+        return replace(evaluation, equilibria=equilibria, confirmations=confirmations)
+
+    def follow(self, q: np.ndarray, previous: Evaluation, steps: int) -> list[Evaluation]:
+        """Evaluations along the straight path from a previous one to q, in equal steps, each
+        started from the last."""
+        path: list[Evaluation] = []
+        for t in np.linspace(0, 1, steps + 1)[1:]:
+            at = q if t == 1 else previous.q + t * (q - previous.q)
+            try:
+                path.append(self.evaluate(at, path[-1] if path else previous, NewtonOptions()))
+            except SimulationFailure as failure:
+                raise failure.within(f"at {t:.0%} of the way to the parts") from None
+        return path
+
+    def _solve(
+        self,
+        role: str,
+        q: np.ndarray,
+        near: Equilibrium,
+        opening: float | None,
+        options: NewtonOptions,
+    ) -> Equilibrium:
+        system = self.design.systems[role]
+        if np.array_equal(q, near.q) and opening == near.opening:
+            return replace(near, iterations=0, escapes=0, wall_s=0.0)
+        start: Start = Sensitivities(system, near).predict(q - near.q)
+        try:
+            return solve(system, q, start, opening, options)
+        except SimulationFailure:
+            # the linear prediction overshoots near bifurcations; the last state itself is the safer
+            # start there
+            return solve(system, q, near, opening, options)
+
+    def judge(self, q: np.ndarray, equilibria: dict[str, Equilibrium]) -> Evaluation:
+        """F of given equilibria; depends on nothing else, so a resumed run judges as the first one
+        did."""
+        role = self.design.fitted_role.name
+        joints = equilibria[role].state.positions[self.design.joints]
+        fit = self._fitting(joints)
+        terms = {
+            term.label(role): weight * term.value(role, equilibria[role.name], fit)
+            for term, weight in self._terms
+            for role in self.design.roles
+            if term.sees(role)
+        }
+        value = float(sum(terms.values()))
+        if not np.isfinite(value):
+            raise SimulationFailure("the objective is not a finite number", where=self.design.name)
+        return Evaluation(
+            np.array(q),
+            value,
+            terms,
+            fit,
+            equilibria,
+            {},
+            sum(eq.iterations for eq in equilibria.values()),
+            len(equilibria),
+        )
+
+
+def reference_of(design: Design) -> Reference:
+    """Simulate the input design: its target, its equilibria, its energy. May raise
+    SimulationFailure."""
+    try:
+        target = design.target
+        equilibria = design.deploy()
+    except SimulationFailure as failure:
+        raise failure.within(f"{design.name}: input design") from None
+    return Reference(target, equilibria[design.fitted_role.name].elastic_energy, equilibria)

@@ -1,0 +1,153 @@
+"""Designs solved in parallel processes: each worker keeps its own workspaces, tasks carry only
+states."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Sequence
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from ..errors import SimulationFailure
+from ..structures.base import Design
+from .memory import peak_memory_mb
+from .objective import DesignObjective, Reference, Weights, reference_of
+
+log = logging.getLogger(__name__)
+
+# Filled in every worker by its initializer: the designs, and the objectives made of them so far.
+_designs: list[Design] = []
+_objectives: dict[tuple[int, Weights], DesignObjective] = {}
+
+
+def _initialise(designs: list[Design]) -> None:
+    _designs[:] = designs
+    _objectives.clear()
+
+
+def _start_worker(designs: list[Design]) -> None:
+    one_thread()
+    _initialise(designs)
+
+
+def one_thread() -> threadpool_limits:
+    """One thread for the BLAS, in this process, until the returned object's
+    `restore_original_limits` is called.
+
+    The matrices are small, more threads only get in the way; and sums would depend on how many
+    cores a machine has.
+    """
+    import scipy.linalg  # noqa: F401  # which brings a BLAS of its own: limits are set for those that are loaded
+
+    return threadpool_limits(1, user_api="blas")
+
+
+def _call(
+    number: int, reference: Reference | None, weights: Weights, method: str, arguments: tuple
+) -> Any:
+    """Run in a worker; a failed simulation comes back as data, so that it doesn't end the whole
+    batch."""
+    try:
+        if reference is None:
+            return reference_of(_designs[number])
+        key = (number, weights)
+        if key not in _objectives:
+            _objectives[key] = DesignObjective(_designs[number], weights, reference)
+        return getattr(_objectives[key], method)(*arguments)
+    except SimulationFailure as failure:
+        return failure
+
+
+def _worker_memory() -> tuple[int, float]:
+    return os.getpid(), peak_memory_mb()
+
+
+class DesignPool:
+    """Runs the methods of `DesignObjective` for many designs at once.
+
+    designs : the designs, in the order of their numbers
+    jobs : processes; 1 works in this process. Results don't depend on it: tasks carry all that they
+        start from.
+    """
+
+    def __init__(self, designs: Sequence[Design], jobs: int = 1):
+        self.designs, self.jobs = list(designs), max(1, min(jobs, len(designs)))
+        self.references: list[Reference] = []
+        self._parallel: Any = None  # joblib's Parallel, which is untyped
+        self._threads: threadpool_limits | None = None
+        if self.jobs == 1:
+            _initialise(self.designs)
+
+    def __enter__(self) -> DesignPool:
+        self._threads = one_thread()
+        if self.jobs > 1:
+            self._start()
+        return self
+
+    def __exit__(self, *exception: Any) -> None:
+        if self._parallel is not None:
+            self._parallel.__exit__(*exception)
+            self._parallel = None
+        if self._threads is not None:
+            self._threads.restore_original_limits()
+        _initialise([])
+
+    def prepare(self) -> list[Reference]:
+        """Simulate all input designs. Raises the first SimulationFailure: a kit needs all of
+        them."""
+        results = self._run([(n, None, Weights(), "", ()) for n in range(len(self.designs))])
+        for result in results:
+            if isinstance(result, SimulationFailure):
+                raise result
+        self.references = results
+        return results
+
+    def map(self, method: str, weights: Weights, calls: dict[int, tuple]) -> dict[int, Any]:
+        """Call a method of the objectives of some designs: {number: arguments} -> {number: result
+        or failure}."""
+        tasks = [
+            (n, self.references[n], weights, method, arguments) for n, arguments in calls.items()
+        ]
+        return dict(zip(calls, self._run(tasks)))
+
+    def peak_memory_mb(self) -> float:
+        """Largest memory of this process and of every worker that is alive, added up; MB."""
+        found = {os.getpid(): peak_memory_mb()}
+        if self._parallel is not None:
+            from joblib import delayed
+
+            found |= dict(self._parallel(delayed(_worker_memory)() for _ in range(4 * self.jobs)))
+        return sum(found.values())
+
+    def _run(self, tasks: list[tuple]) -> list[Any]:
+        if self._parallel is None or len(tasks) < 2:
+            if not _designs:
+                _initialise(self.designs)
+            return [_call(*task) for task in tasks]
+        from joblib import delayed
+        from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+        for attempt in range(3):
+            try:
+                return self._parallel(delayed(_call)(*task) for task in tasks)
+            except TerminatedWorkerError:
+                log.warning(
+                    "a worker process ended unexpectedly; starting anew (attempt %d)", attempt + 1
+                )
+                self._start()
+        raise SimulationFailure("worker processes keep ending unexpectedly (out of memory?)")
+
+    def _start(self) -> None:
+        from joblib import Parallel
+
+        self._parallel = Parallel(
+            n_jobs=self.jobs,
+            backend="loky",
+            initializer=_start_worker,
+            initargs=(self.designs,),
+            batch_size=1,
+            pre_dispatch="all",
+        )
+        self._parallel.__enter__()

@@ -1,0 +1,222 @@
+"""The two optimisation problems: over all elements, drawn to the kit (relaxed), and over the kit
+alone (assigned)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..kit.kinds import Bounds
+from ..kit.parts import Assignment, Kit
+from ..kit.projection import Projection
+from ..sqp.constraints import LinearConstraints
+from ..sqp.problem import Derivatives, LiftedTerm, Point
+from .dataset import Dataset
+from .objective import Evaluation
+
+
+@dataclass
+class DatasetPoint:
+    """What the problems keep with a point.
+
+    evaluations : of all designs; replaced by Exudyn's once derivatives are taken there
+    solved : of all designs, as they were found first: a resumed run confirms and goes on from the
+        same states
+    kit, assignment : nearest to the point (relaxed), or that the point is made of (assigned)
+    terms : the objective's terms by name, summed over designs
+    """
+
+    evaluations: list[Evaluation]
+    kit: Kit
+    assignment: Assignment
+    terms: dict[str, float]
+    solved: list[Evaluation] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.solved = self.evaluations
+
+
+class RelaxedProblem:
+    """J(q) = sum F(q) + P(q) over the parameters q of all elements; the kit follows q.
+
+    constraints : on q, besides its bounds
+    fixed_kit : keep the kit (projection onto an existing one), only the assignment follows
+    """
+
+    def __init__(
+        self,
+        dataset: Dataset,
+        projection: Projection,
+        kit: Kit,
+        bounds: Bounds | None = None,
+        constraints: LinearConstraints | None = None,
+        fixed_kit: bool = False,
+    ):
+        self.dataset, self.projection, self.kit, self.fixed_kit = (
+            dataset,
+            projection,
+            kit,
+            fixed_kit,
+        )
+        self.lower, self.upper = dataset.bounds(bounds)
+        self.n = len(self.lower)
+        self.constraints = (
+            constraints if constraints is not None else LinearConstraints.none(self.n)
+        )
+        self.scale = dataset.scales()
+        self.block_sizes = tuple(np.diff(dataset.offsets).tolist())
+
+    def evaluate(self, x: np.ndarray, previous: Point | None) -> Point:
+        before: DatasetPoint | None = previous.data if previous is not None else None
+        evaluations = self.dataset.evaluate(x, before.evaluations if before else None)
+        return self.point(x, evaluations, before.kit if before else self.kit)
+
+    def point(self, x: np.ndarray, evaluations: list[Evaluation], kit: Kit) -> Point:
+        """The point of given evaluations, its kit found from a nearby one."""
+        nearest = self.projection.minimise(x, kit, self.fixed_kit)
+        terms = _sum_terms(self.dataset, evaluations) | {"projection": nearest.energy}
+        value = self.dataset.value(evaluations) + nearest.energy
+        return Point(x, value, DatasetPoint(evaluations, nearest.kit, nearest.assignment, terms))
+
+    def derivatives(self, point: Point) -> Derivatives:
+        data: DatasetPoint = point.data
+        designs = self.dataset.derivatives(data.evaluations, hessian=True)
+        data.evaluations = [d.evaluation for d in designs]
+        weights = self.dataset.design_weights
+        own = np.concatenate([w * d.gradient for w, d in zip(weights, designs)])
+        gradient = own + self.projection.gradient(point.x, data.kit, data.assignment)
+        hessian = sp.block_diag([w * d.model for w, d in zip(weights, designs)], format="csc")
+        quadratic = self.projection.hessian(point.x, data.kit, data.assignment)
+        if self.fixed_kit:
+            return Derivatives(gradient, sp.csc_matrix(hessian + sp.csc_matrix(quadratic.qq)))
+        used = np.flatnonzero(quadratic.pp.diagonal() > 0)  # a side that no element uses has no say
+        extra = LiftedTerm(
+            sp.csc_matrix(quadratic.qq),
+            sp.csc_matrix(sp.csc_matrix(quadratic.qp)[:, used]),
+            sp.csc_matrix(sp.csc_matrix(quadratic.pp)[used][:, used]),
+        )
+        return Derivatives(gradient, hessian, extra, own)
+
+    def first_derivatives(self, point: Point) -> Derivatives:
+        """The gradient alone: one adjoint solve a state instead of all sensitivities."""
+        data: DatasetPoint = point.data
+        designs = self.dataset.derivatives(data.evaluations, hessian=False)
+        data.evaluations = [d.evaluation for d in designs]
+        own = np.concatenate([w * d.gradient for w, d in zip(self.dataset.design_weights, designs)])
+        return Derivatives(own + self.projection.gradient(point.x, data.kit, data.assignment))
+
+
+class AssignedProblem:
+    """J(x) = sum F(M x) over x = (p, y): the parts p, every element being its part, and the
+    parameters y of no element.
+
+    The assignment is fixed. M (n_q, n_p + k) is the assignment's for the parts, and puts y in its
+    places.
+    constraints : on the elements q = M p, as in `RelaxedProblem`
+    """
+
+    def __init__(
+        self,
+        dataset: Dataset,
+        kit: Kit,
+        assignment: Assignment,
+        bounds: Bounds | None = None,
+        constraints: LinearConstraints | None = None,
+    ):
+        self.dataset, self.kit, self.assignment = dataset, kit, assignment
+        self.part_bounds, self.of_elements = bounds, constraints
+        self._free, self._n_parts = dataset.free, len(kit.vector)
+        places = sp.csr_matrix(
+            (np.ones(len(self._free)), (self._free, np.arange(len(self._free)))),
+            shape=(assignment.n_q, len(self._free)),
+        )
+        self.matrix = sp.csr_matrix(sp.hstack([assignment.matrix(kit), places]))
+        unlimited = np.full(len(self._free), np.inf)
+        self.lower, self.upper = (
+            np.append(side, sign * unlimited) for side, sign in zip(kit.bounds(bounds), (-1, 1))
+        )
+        self._limit_by_designs()
+        self.n = len(self.lower)
+        self.constraints = (
+            constraints.through(self.matrix)
+            if constraints is not None
+            else LinearConstraints.none(self.n)
+        )
+        self.scale = self._scale()
+
+    def variables(self, q: np.ndarray) -> np.ndarray:
+        """x of the problem's kit, with the parameters of no element as they are in q (n_q,)."""
+        return np.append(self.kit.vector, q[self._free])
+
+    def kit_of(self, x: np.ndarray) -> Kit:
+        """The parts in x."""
+        return self.kit.with_vector(x[: self._n_parts])
+
+    def free_of(self, x: np.ndarray) -> np.ndarray:
+        """The parameters of no element in x."""
+        return x[self._n_parts :]
+
+    def evaluate(self, x: np.ndarray, previous: Point | None) -> Point:
+        before: DatasetPoint | None = previous.data if previous is not None else None
+        return self.point(
+            x, self.dataset.evaluate(self.matrix @ x, before.evaluations if before else None)
+        )
+
+    def point(self, x: np.ndarray, evaluations: list[Evaluation]) -> Point:
+        """The point of given evaluations."""
+        data = DatasetPoint(
+            evaluations, self.kit_of(x), self.assignment, _sum_terms(self.dataset, evaluations)
+        )
+        return Point(x, self.dataset.value(evaluations), data)
+
+    def derivatives(self, point: Point) -> Derivatives:
+        data: DatasetPoint = point.data
+        designs = self.dataset.derivatives(data.evaluations, hessian=True)
+        data.evaluations = [d.evaluation for d in designs]
+        gradient, hessian = np.zeros(self.n), np.zeros((self.n, self.n))
+        for weight, d, start, end in zip(
+            self.dataset.design_weights, designs, self.dataset.offsets, self.dataset.offsets[1:]
+        ):
+            rows = self.matrix[start:end]
+            gradient += weight * (rows.T @ d.gradient)
+            hessian += weight * (rows.T @ (rows.T @ d.model.T).T)
+        unused = np.flatnonzero(np.abs(hessian).sum(axis=1) == 0)
+        # parts that nothing uses stay where they are
+        hessian[unused, unused] = np.abs(hessian.diagonal()).mean()
+        return Derivatives(gradient, sp.csc_matrix(hessian))
+
+    def first_derivatives(self, point: Point) -> Derivatives:
+        """The gradient alone, as in `RelaxedProblem`."""
+        data: DatasetPoint = point.data
+        designs = self.dataset.derivatives(data.evaluations, hessian=False)
+        data.evaluations = [d.evaluation for d in designs]
+        weighted = np.concatenate(
+            [w * d.gradient for w, d in zip(self.dataset.design_weights, designs)]
+        )
+        return Derivatives(self.matrix.T @ weighted)
+
+    def _limit_by_designs(self) -> None:
+        """An element's own bounds are its part's: entries of M are +-1, one a row."""
+        lower, upper = self.dataset.bounds(None)
+        rows = self.matrix.tocoo()
+        for row, part, sign in zip(rows.row, rows.col, rows.data):
+            low, high = (lower[row], upper[row]) if sign > 0 else (-upper[row], -lower[row])
+            self.lower[part] = max(self.lower[part], low)
+            self.upper[part] = min(self.upper[part], high)
+
+    def _scale(self) -> np.ndarray:
+        """A part's scale is that of the elements it serves."""
+        scale = np.zeros(self.n)
+        rows = self.matrix.tocoo()
+        np.maximum.at(scale, rows.col, self.dataset.scales()[rows.row])
+        return np.where(scale > 0, scale, 1.0)
+
+
+def _sum_terms(dataset: Dataset, evaluations: list[Evaluation]) -> dict[str, float]:
+    total: dict[str, float] = {}
+    for weight, evaluation in zip(dataset.design_weights, evaluations):
+        for name, value in evaluation.terms.items():
+            total[name] = total.get(name, 0.0) + float(weight * value)
+    return total

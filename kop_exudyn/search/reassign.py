@@ -1,0 +1,235 @@
+"""Better parts for the elements than the nearest ones: those that a quadratic model of the
+objective prefers.
+
+The projection energy sees an element only by its distance to a part. Shape and energy, however,
+don't care about most changes of an element as long as its neighbours make up for them. Here every
+element is given the part (and variant) that lowers m(q) = g.(q - q0) + 1/2 (q - q0).(H + mu S^-2)(q
+- q0) most, with gradient g and Hessian H of the designs' objective at q0, the parameters' scales S,
+and the others' parts as they are; one element after the other, until none gains any more. In
+between, the parts themselves are moved to the minimum of m(M p). mu limits how far the model is
+trusted. This is coordinate descent on a closest-vector problem; it ends in a local minimum of m,
+which is never higher than where it began.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numba as nb
+import numpy as np
+import scipy.sparse as sp
+
+from ..kit.kinds import part_kind
+from ..kit.parts import Assignment, Kit
+from ..sqp.qp import QP, QPSolver
+from .objective import DesignDerivatives
+from .problems import AssignedProblem
+
+_SETTLED = 1e-6  # rounds that gain less than this share of the gain so far are the last
+_ROUNDS = 50
+
+
+@dataclass(frozen=True)
+class LocalModel:
+    """m of the designs side by side: they are coupled by the parts alone.
+
+    base : per design, q0 (nq,);  gradients : (nq,);  hessians : (nq, nq), with the damping
+    rounding : a gain that can't be told from rounding
+    """
+
+    base: tuple[np.ndarray, ...]
+    gradients: tuple[np.ndarray, ...]
+    hessians: tuple[np.ndarray, ...]
+    rounding: float
+
+    @classmethod
+    def of(
+        cls,
+        derivatives: Sequence[DesignDerivatives],
+        weights: Sequence[float],
+        scales: Sequence[np.ndarray],
+        damping: float,
+    ) -> LocalModel:
+        """The model at evaluated designs.
+
+        weights : of the designs;  scales : per design, sizes (nq,) of its parameters
+        damping : mu, relative to the mean diagonal entry of the scaled Hessian
+        """
+        scaled = np.concatenate(
+            [w * np.diagonal(d.model) * s**2 for d, w, s in zip(derivatives, weights, scales)]
+        )
+        curvature = float(np.abs(scaled).mean())
+        mu = damping * curvature
+        return cls(
+            tuple(d.evaluation.q for d in derivatives),
+            tuple(w * d.gradient for d, w in zip(derivatives, weights)),
+            tuple(
+                w * d.model + np.diag(mu / s**2) for d, w, s in zip(derivatives, weights, scales)
+            ),
+            1e-12 * curvature,
+        )
+
+    def values(self, q: Sequence[np.ndarray]) -> np.ndarray:
+        """(n_designs,) m by design; zero at the base."""
+        steps = [a - b for a, b in zip(q, self.base)]
+        return np.array(
+            [g @ r + 0.5 * r @ (h @ r) for g, h, r in zip(self.gradients, self.hessians, steps)]
+        )
+
+    def slopes(self, q: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Per design, the derivative (nq,) of m."""
+        return [g + h @ (a - b) for g, h, a, b in zip(self.gradients, self.hessians, q, self.base)]
+
+
+@dataclass(frozen=True)
+class Reassignment:
+    """Another kit and assignment, the parameters of no element to go with them (k,), what the model
+    promises of them by design, and how many elements changed."""
+
+    kit: Kit
+    assignment: Assignment
+    free: np.ndarray
+    predicted: np.ndarray
+    changes: int
+
+
+def reassign(
+    problem: AssignedProblem, model: LocalModel, frozen: Sequence[int] = (), fixed_kit: bool = False
+) -> Reassignment | None:
+    """Improve the assignment of a problem, and unless `fixed_kit` its parts, under the model.
+
+    frozen : designs whose elements keep their parts. Elements of kinds that realise intervals keep
+    theirs too. Returns None where no element gains by another part, or the constraints can't be met
+    with what it would get.
+    """
+    before, vector = problem.assignment, problem.variables(np.concatenate(model.base))
+    start = value = model.values(problem.dataset.split(problem.matrix @ vector)).sum()
+    current = problem
+    for _ in range(_ROUNDS):
+        changed = _sweep(current, vector, model, frozen)
+        if changed is not None:
+            current = AssignedProblem(
+                problem.dataset, problem.kit, changed, problem.part_bounds, problem.of_elements
+            )
+        moved = vector if fixed_kit else _best_parts(current, vector, model)
+        if moved is None:
+            return None
+        vector, last = moved, value
+        value = model.values(problem.dataset.split(current.matrix @ vector)).sum()
+        if last - value <= max(_SETTLED * (start - value), model.rounding):
+            break
+    changes = current.assignment.changes(before)
+    if not changes:
+        return None
+    predicted = model.values(problem.dataset.split(current.matrix @ vector))
+    return Reassignment(
+        problem.kit_of(vector), current.assignment, problem.free_of(vector), predicted, changes
+    )
+
+
+def _sweep(
+    problem: AssignedProblem, vector: np.ndarray, model: LocalModel, frozen: Sequence[int]
+) -> Assignment | None:
+    """Give every element its best part, the parts staying as they are; None when all have
+    theirs."""
+    dataset, kit = problem.dataset, problem.kit_of(vector)
+    q = [part.copy() for part in dataset.split(problem.matrix @ vector)]
+    slopes = model.slopes(q)
+    parts, variants = list(problem.assignment.part), list(problem.assignment.variant)
+    design_of = np.repeat(np.arange(len(q)), [len(d.groups) for d in dataset.designs])
+    offsets = dataset.offsets
+    changes = 0
+    for number, (group, n) in enumerate(zip(problem.assignment.groups, design_of)):
+        if n in frozen or len(group.indices) == 0:
+            continue
+        ways = part_kind(group.kind).variants_of(group.indices.shape[1])
+        if ways.reach is not None:
+            continue
+        candidates = np.einsum("vek,mk->mve", ways.matrices, kit[group.kind])
+        n_ways = len(ways.names)
+        choice = parts[number] * n_ways + variants[number]
+        changes += _descend(
+            q[n],
+            slopes[n],
+            model.hessians[n],
+            group.indices - offsets[n],
+            candidates.reshape(-1, candidates.shape[2]),
+            choice,
+            model.rounding,
+        )
+        parts[number], variants[number] = choice // n_ways, choice % n_ways
+    if not changes:
+        return None
+    return Assignment(
+        problem.assignment.groups, tuple(parts), tuple(variants), problem.assignment.n_q
+    )
+
+
+@nb.njit(cache=True)
+def _descend(q, slope, hessian, indices, candidates, choice, least):
+    """Coordinate descent over one group of elements until none gains; q, slope and choice are
+    brought up to date.
+
+    least : gain that counts; without one, two elements might swap forever
+    """
+    n, k = indices.shape
+    total, changed = 0, 1
+    while changed:
+        changed = 0
+        for e in range(n):
+            best, which = -least, choice[e]
+            for c in range(len(candidates)):
+                gain = 0.0
+                for i in range(k):
+                    d_i = candidates[c, i] - q[indices[e, i]]
+                    gain += slope[indices[e, i]] * d_i
+                    for j in range(k):
+                        gain += (
+                            0.5
+                            * d_i
+                            * hessian[indices[e, i], indices[e, j]]
+                            * (candidates[c, j] - q[indices[e, j]])
+                        )
+                if gain < best:
+                    best, which = gain, c
+            if which != choice[e]:
+                for i in range(k):
+                    d_i = candidates[which, i] - q[indices[e, i]]
+                    slope += hessian[indices[e, i]] * d_i
+                    q[indices[e, i]] = candidates[which, i]
+                choice[e] = which
+                changed += 1
+        total += changed
+    return total
+
+
+def _best_parts(
+    problem: AssignedProblem, vector: np.ndarray, model: LocalModel
+) -> np.ndarray | None:
+    """(n_p + k,) the variables that minimise m(M x) within bounds and constraints; None where these
+    can't be met."""
+    rows = [
+        problem.matrix[a:b] for a, b in zip(problem.dataset.offsets, problem.dataset.offsets[1:])
+    ]
+    slopes = model.slopes(problem.dataset.split(problem.matrix @ vector))
+    gradient = sum(m.T @ s for m, s in zip(rows, slopes))
+    hessian = sum(m.T @ (m.T @ h).T for m, h in zip(rows, model.hessians))
+    hessian = 0.5 * (hessian + hessian.T)
+    unused = np.flatnonzero(np.abs(hessian).sum(axis=1) == 0)
+    hessian[unused, unused] = np.abs(hessian.diagonal()).mean()
+    limits, now = problem.constraints, problem.constraints.A @ vector
+    result = QPSolver().solve(
+        QP(
+            sp.csc_matrix(hessian),
+            gradient,
+            limits.A,
+            limits.lower - now,
+            limits.upper - now,
+            problem.lower - vector,
+            problem.upper - vector,
+        )
+    )
+    if result.status != "solved":
+        return None if limits.rows else vector  # an indefinite model: the parts stay
+    return np.clip(vector + result.x, problem.lower, problem.upper)

@@ -1,0 +1,161 @@
+"""The outcome of a kit optimisation, in the words of the result file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..errors import SimulationFailure
+from ..kit.parts import Assignment, Kit
+from ..structures.base import Design
+from ..structures.fitting import TargetFitting
+from ..structures.strength import strength_summary
+from .events import events_to_list
+from .objective import Evaluation, Reference
+from .stage_results import SAME_STATE, StageEvent, StageResult, distance
+
+INPUT = "input"  # the designs as given, before all stages
+REDEPLOYED = "redeployed"  # the assigned designs, opened from their assembly
+STAGES = ("direct", "unrelaxed", "relaxed", "assigned")
+
+
+@dataclass
+class KitResult:
+    """All stages of one run.
+
+    designs, references : what was asked for
+    stages : by name ("direct", "unrelaxed", "relaxed", "assigned")
+    events : accepted steps of all SQPs, in order
+    redeployed : by design, the state that the assigned parts open into by themselves; empty where
+        it wasn't computed
+    equilibria, newton_iterations : solved in all
+    settings : as given, for the record
+    """
+
+    designs: list[Design]
+    references: list[Reference]
+    stages: dict[str, StageResult]
+    events: list[StageEvent] = field(default_factory=list)
+    equilibria: int = 0
+    newton_iterations: int = 0
+    wall_s: float = 0.0
+    peak_memory_mb: float = 0.0
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    redeployed: Sequence[Evaluation | SimulationFailure] = ()
+
+    @property
+    def kit(self) -> Kit:
+        """The kit that the run was for."""
+        return self.stages["assigned"].kit
+
+    @property
+    def assignment(self) -> Assignment:
+        return self.stages["assigned"].assignment
+
+    def summary(self, stage: str, number: int) -> dict[str, Any]:
+        """Fit, energy and confirmation of one design after a stage, or {"failed": why}."""
+        outcome = self.stages[stage].designs[number]
+        return summary_of(outcome, self.designs[number], self.references[number])
+
+    def input_summary(self, number: int) -> dict[str, Any]:
+        """Fit and energy of one input design: what of a stage's deviation no kit is to blame
+        for."""
+        design, reference = self.designs[number], self.references[number]
+        joints = reference.equilibria[design.fitted_role.name].state.positions[design.joints]
+        fit = TargetFitting(reference.target)(joints)
+        return {
+            "fit": {"max_percent": fit.max_percent, "mean_percent": fit.mean_percent},
+            "elastic_energy": reference.energy,
+        }
+
+    def redeployment(self, number: int) -> dict[str, Any]:
+        """Where the assigned design's parts open into by themselves: fit, energy, and whether it's
+        the kept state.
+
+        {"failed": why} where that deployment (or the design) failed.
+        """
+        opened, kept = self.redeployed[number], self.stages["assigned"].designs[number]
+        if isinstance(opened, SimulationFailure):
+            return {"failed": str(opened)}
+        if isinstance(kept, SimulationFailure):
+            return {"failed": str(kept)}
+        role = self.designs[number].fitted_role.name
+        moved = distance(self.designs[number], opened, kept)
+        energy = opened.equilibria[role].elastic_energy
+        return {
+            "same_state": moved <= SAME_STATE,
+            "moved_percent": 100 * moved,
+            "fit": {"max_percent": opened.fit.max_percent, "mean_percent": opened.fit.mean_percent},
+            "elastic_energy": energy,
+            "energy_ratio": energy / self.references[number].energy,
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """As result.json has it."""
+        return {
+            "designs": [
+                {
+                    "name": design.name,
+                    "elements": design.n_elements,
+                    "input": self.input_summary(n),
+                    **{stage: self.summary(stage, n) for stage in STAGES if stage in self.stages},
+                    **({"redeployed": self.redeployment(n)} if self.redeployed else {}),
+                }
+                for n, design in enumerate(self.designs)
+            ],
+            "kit": {kind: _plain(parts) for kind, parts in self.kit.parts.items()},
+            "assignment": self.assignment.to_dict(),
+            "steps": {
+                stage: self.stages[stage].steps
+                for stage in ("relaxed", "assigned", "unrelaxed")
+                if stage in self.stages
+            },
+            "objective": {
+                stage: self.stages[stage].value for stage in STAGES if stage in self.stages
+            },
+            "jumps": [
+                {
+                    "stage": name,
+                    "design": j.design,
+                    "fraction": j.fraction,
+                    "distance_percent": 100 * j.distance,
+                }
+                for name, stage in self.stages.items()
+                for j in stage.jumps
+            ],
+            "status": {
+                stage: result.status for stage, result in self.stages.items() if result.status
+            },
+            "equilibria": self.equilibria,
+            "newton_iterations": self.newton_iterations,
+            "wall_s": self.wall_s,
+            "peak_memory_mb": self.peak_memory_mb,
+            "settings": dict(self.settings),
+            "history": events_to_list(self.events),
+        }
+
+
+def summary_of(
+    outcome: Evaluation | SimulationFailure, design: Design, reference: Reference
+) -> dict[str, Any]:
+    """One design's figures: fit in % of the bounding box, energies, stability, Exudyn's
+    confirmation, stresses."""
+    if isinstance(outcome, SimulationFailure):
+        return {"failed": str(outcome)}
+    role = design.fitted_role.name
+    energy = outcome.equilibria[role].elastic_energy
+    return {
+        "fit": {"max_percent": outcome.fit.max_percent, "mean_percent": outcome.fit.mean_percent},
+        "elastic_energy": energy,
+        "energy_ratio": energy / reference.energy,
+        "stable": all(eq.stable for eq in outcome.equilibria.values()),
+        "exudyn": outcome.confirmations[role].to_dict(),
+        "strength": strength_summary(design, outcome.equilibria),
+    }
+
+
+def _plain(parts: np.ndarray) -> list:
+    return (parts[:, 0] if parts.shape[1] == 1 else parts).tolist()

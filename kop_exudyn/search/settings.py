@@ -1,0 +1,63 @@
+"""What the stages of finding a kit are run with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..kit.kinds import Bounds
+from ..sqp.constraints import LinearConstraints
+
+
+@dataclass(frozen=True)
+class StageSettings:
+    """Settings of the stages.
+
+    schedule : values of w_c, one after the other; default: 0.1, 1, 10 and 100 times the weight of
+        the fit, so that the balance of fit and projection is the same whatever the weights
+    tight : largest rms distance of elements to their parts, relative to the kind's scale, at which
+        raising w_c ends
+    relaxed_steps, assigned_steps, round_steps : accepted SQP steps at most: for each w_c, for an
+        assigned stage (or baseline) without reassignments, for each round of one with them
+    relaxed_tolerance, last_tolerance, round_tolerance, assigned_tolerance : the SQPs of the relaxed
+        stage before the last w_c, with the last one, those of rounds in the assigned stage, and its
+        last one end when steps promise or gain less than this share of J
+    reassignments : rounds of the assigned stage in which elements get other parts (see
+        reassign.py), at most; a round that gains less than `reassigned_tolerance` of J is the last
+    leaps : how often, after these rounds, many elements get other parts at once whatever J does,
+        and two more rounds from there; what is no better is undone, and a gain below
+        `reassigned_tolerance` is the last, see `in_rounds`
+    redeployments : how often, after the assigned stage, the designs are opened from their assembly
+        instead of led from the relaxed ones, and the stage goes on from where they end, see
+        `that_open` in rounds.py
+    path_steps : steps of the watched path between the stages
+    rescues : how often w_c is raised by ten when a design fails on that path, or snaps and there
+        are no reassignments
+    growth : how often then, when raising w_c didn't help, every kind gets one part more
+    restarts, seed : of the clustering
+    bounds : kind -> (lower, upper) of the parts, besides the natural ones
+    constraints : on the elements of all designs, see `on_elements`; the baselines "direct" and
+        "unrelaxed" keep to them as far as their parts can
+    hessian : "exact" or "bfgs"
+    """
+
+    schedule: tuple[float, ...] | None = None
+    tight: float = 1e-3
+    relaxed_steps: int = 25
+    assigned_steps: int = 40
+    round_steps: int = 15
+    relaxed_tolerance: float = 3e-3
+    last_tolerance: float = 5e-4
+    round_tolerance: float = 2e-3
+    assigned_tolerance: float = 1e-4
+    reassignments: int = 4
+    reassigned_tolerance: float = 2e-2
+    leaps: int = 3
+    redeployments: int = 0
+    path_steps: int = 10
+    rescues: int = 2
+    growth: int = 0
+    restarts: int = 20
+    seed: int = 0
+    bounds: Bounds | None = None
+    constraints: LinearConstraints | None = None
+    hessian: str = "exact"

@@ -1,0 +1,147 @@
+"""What the stages of finding a kit leave: steps, snaps and results, and how results are compared
+and put together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ..errors import SimulationFailure
+from ..kit.parts import Assignment, Kit
+from ..sqp.history import StepRecord
+from ..structures.base import Design
+from .dataset import Dataset
+from .objective import Evaluation
+
+# A joint that moves this much further in one step of the path than in the steps around it has
+# snapped.
+_JUMP_FACTOR = 6.0
+_JUMP_SHARE = 0.01  # of the bounding box; smaller moves are no snap whatever their ratio
+SAME_STATE = 1e-3  # of the bounding box: states whose joints are this close are one
+
+
+@dataclass(frozen=True)
+class StageEvent:
+    """One accepted step, as observers see it: the SQP's name, the record, the objective's terms,
+    w_c (or None).
+
+    The SQP of round 2 of the assigned stage is "assigned-2".
+    """
+
+    sqp: str
+    record: StepRecord
+    terms: Mapping[str, float]
+    weight: float | None
+
+    @property
+    def stage(self) -> str:
+        """ "relaxed" with all its w_c and rescues, "assigned" with all its rounds, or
+        "unrelaxed"."""
+        return "relaxed" if self.weight is not None else self.sqp.partition("-")[0]
+
+    @property
+    def round(self) -> int | None:
+        """The round of the assigned stage, from 1; None elsewhere."""
+        number = self.sqp.partition("-")[2]
+        return int(number) if self.stage == "assigned" and number else None
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A snap on the path to the parts: which design, at which fraction of the way, how far (share
+    of the box)."""
+
+    design: str
+    fraction: float
+    distance: float
+
+
+@dataclass
+class StageResult:
+    """What a stage left: by design an evaluation confirmed by Exudyn, or the failure that it met.
+
+    kit, assignment : those that the stage ended with
+    steps : accepted steps; value : objective (None where a design failed); status : of the last SQP
+    """
+
+    designs: list[Evaluation | SimulationFailure]
+    kit: Kit
+    assignment: Assignment
+    steps: int = 0
+    value: float | None = None
+    status: str = ""
+    jumps: list[Jump] = field(default_factory=list)
+
+    @property
+    def evaluations(self) -> list[Evaluation]:
+        """Those of all designs, where none failed. Raises the SimulationFailure of one that did."""
+        found = []
+        for outcome in self.designs:
+            if isinstance(outcome, SimulationFailure):
+                raise outcome
+            found.append(outcome)
+        return found
+
+
+def find_jump(
+    design: Any, start: Evaluation, path: Sequence[Evaluation], diagonal: float
+) -> Jump | None:
+    """The largest snap on a path of equal parameter steps, or None: joints that move far more in
+    one step."""
+    role = design.fitted_role.name
+    positions = [e.equilibria[role].state.positions[design.joints] for e in (start, *path)]
+    moves = (
+        np.array([np.linalg.norm(b - a, axis=1).max() for a, b in zip(positions, positions[1:])])
+        / diagonal
+    )
+    worst = int(np.argmax(moves))
+    if moves[worst] > _JUMP_SHARE and moves[worst] > _JUMP_FACTOR * np.median(moves):
+        return Jump(design.name, (worst + 1) / len(path), float(moves[worst]))
+    return None
+
+
+def distance(design: Design, a: Evaluation, b: Evaluation) -> float:
+    """How far apart two states of a design are: the largest distance of a joint, as a share of the
+    bounding box.
+
+    Each state is at its best placement on the target.
+    """
+    role = design.fitted_role.name
+    joints = [
+        e.fit.placement.apply(e.equilibria[role].state.positions[design.joints]) for e in (a, b)
+    ]
+    return float(np.linalg.norm(joints[0] - joints[1], axis=1).max()) / a.fit.diagonal
+
+
+def mixed(results: Sequence[StageResult], dataset: Dataset) -> StageResult:
+    """Each design from its own result, all of the same kit; its objective is to be judged anew."""
+    first = np.cumsum([0, *(len(design.groups) for design in dataset.designs)])
+
+    def pick(name: str) -> tuple[np.ndarray, ...]:
+        return tuple(
+            rows
+            for n, result in enumerate(results)
+            for rows in getattr(result.assignment, name)[first[n] : first[n + 1]]
+        )
+
+    assignment = replace(results[0].assignment, part=pick("part"), variant=pick("variant"))
+    return StageResult(
+        [result.designs[n] for n, result in enumerate(results)], results[0].kit, assignment
+    )
+
+
+def restrict(assignment: Assignment, dataset: Dataset, members: Sequence[int]) -> Assignment:
+    """The assignment of some designs of a dataset, in the numbering of their subset."""
+    subset = dataset.subset(members)
+    counts = [len(d.groups) for d in dataset.designs]
+    first = np.cumsum([0, *counts])
+    rows = [k for n in members for k in range(first[n], first[n + 1])]
+    return Assignment(
+        tuple(subset.groups),
+        tuple(assignment.part[k] for k in rows),
+        tuple(assignment.variant[k] for k in rows),
+        int(subset.offsets[-1]),
+    )

@@ -1,0 +1,439 @@
+"""The stages of finding a kit: direct, unrelaxed, relaxed, the watched path to the parts, and
+assigned."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..errors import InputError, SimulationFailure
+from ..kit.cluster import cluster
+from ..kit.parts import Assignment, Kit
+from ..kit.projection import Projection
+from ..sqp.constraints import check_feasible
+from ..sqp.history import SQPState
+from ..sqp.problem import Point
+from ..sqp.solver import SQPOptions, SQPResult, minimise
+from .dataset import Dataset, evaluations_from_arrays, evaluations_to_arrays
+from .objective import Evaluation
+from .problems import AssignedProblem, RelaxedProblem
+from .settings import StageSettings
+from .stage_results import Jump, StageEvent, StageResult, find_jump, restrict
+
+log = logging.getLogger(__name__)
+
+
+class Store(Protocol):
+    """Where checkpoints go: named sets of plain arrays."""
+
+    def load(self, name: str) -> Mapping[str, np.ndarray] | None: ...
+
+    def save(self, name: str, arrays: Mapping[str, np.ndarray]) -> None: ...
+
+
+class NoStore:
+    """Keeps nothing."""
+
+    def load(self, name: str) -> None:
+        return None
+
+    def save(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
+        pass
+
+
+Observer = Callable[[StageEvent], None]
+
+
+class Stages:
+    """Runs the stages for one dataset; interrupted SQPs go on from the store's checkpoints."""
+
+    def __init__(
+        self,
+        dataset: Dataset,
+        parts: Mapping[str, int],
+        settings: StageSettings = StageSettings(),
+        store: Store | None = None,
+        observer: Observer | None = None,
+    ):
+        weights = dataset.weights
+        self.schedule = settings.schedule or tuple(
+            k * (weights.fit or weights.energy) for k in (0.1, 1.0, 10.0, 100.0)
+        )
+        self.dataset, self.parts, self.settings = dataset, dict(parts), settings
+        self.store, self.observer = store or NoStore(), observer or (lambda event: None)
+        self.q0 = dataset.parameters
+        self.projection = Projection.of_inputs(dataset.groups, self.q0, bounds=settings.bounds)
+
+    def direct(self, kit: Kit | None = None) -> StageResult:
+        """Cluster the inputs (or take a kit), replace every element by its part."""
+        clustering = None
+        if kit is None:
+            clustering = cluster(
+                self.dataset.groups,
+                self.q0,
+                self.parts,
+                bounds=self.settings.bounds,
+                restarts=self.settings.restarts,
+                seed=self.settings.seed,
+            )
+            kit = clustering.kit
+        nearest = self.projection.minimise(self.q0, kit, fixed_kit=True)
+        assignment = clustering.assignment if clustering is not None else nearest.assignment
+        return self.confirmed(self.built_from(kit, assignment, self.inputs()))
+
+    def inputs(self) -> list[Evaluation]:
+        """The input designs, judged by the objective."""
+        calls = {
+            n: (d.parameters, dict(r.equilibria))
+            for n, (d, r) in enumerate(zip(self.dataset.designs, self.dataset.references))
+        }
+        return list(self.dataset.judge(calls).values())
+
+    def relaxed(
+        self,
+        kit: Kit,
+        start: Sequence[Evaluation] | None = None,
+        fixed_kit: bool = False,
+        name: str = "relaxed",
+    ) -> StageResult:
+        """Minimise over all elements, w_c raised until the clusters are tight; from the inputs or
+        given evaluations."""
+        settings, evaluations = self.settings, list(start or self.inputs())
+        steps, q = 0, np.concatenate([e.q for e in evaluations])
+        for weight in self.schedule:
+            result, problem = self._relax(
+                f"{name}-{weight:g}", weight, q, evaluations, kit, fixed_kit
+            )
+            q, evaluations, kit = result.x, result.point.data.evaluations, result.point.data.kit
+            steps += result.steps
+            if (
+                max(problem.projection.tightness(q, kit, result.point.data.assignment).values())
+                <= settings.tight
+            ):
+                break
+        data = result.point.data
+        return StageResult(
+            list(evaluations), kit, data.assignment, steps, result.point.value, result.status
+        )
+
+    def assigned(
+        self,
+        start: StageResult,
+        name: str = "assigned",
+        max_steps: int | None = None,
+        tolerance: float | None = None,
+    ) -> StageResult:
+        """Minimise over the parts from a state in which every element is its part; designs that
+        failed stay out.
+
+        max_steps, tolerance : default: the settings' `assigned_steps` and `assigned_tolerance`
+        """
+        members = [n for n, e in enumerate(start.designs) if isinstance(e, Evaluation)]
+        if not members:
+            return replace(start, status="no design could be built from the kit", jumps=[])
+        problem = self.assigned_problem(start, members)
+        try:
+            check_feasible(problem.lower, problem.upper, problem.constraints)
+        except InputError as error:
+            log.warning(
+                "%s: the elements' constraints can't be met by these parts: %s", name, error
+            )
+            return replace(start, status="the constraints can't be met by these parts", jumps=[])
+        evaluations = [e for e in start.designs if isinstance(e, Evaluation)]
+        point = problem.point(
+            problem.variables(np.concatenate([e.q for e in evaluations])), evaluations
+        )
+        options = SQPOptions(
+            hessian=self.settings.hessian,
+            secant=True,
+            max_steps=max_steps or self.settings.assigned_steps,
+            decrease_tolerance=tolerance or self.settings.assigned_tolerance,
+        )
+        result = self._sqp(name, problem, point, options, None)
+        designs = list(start.designs)
+        for n, evaluation in zip(members, result.point.data.evaluations):
+            designs[n] = evaluation
+        return self.confirmed(
+            self._result(
+                designs, result.point.data.kit, start.assignment, result.steps, result.status
+            )
+        )
+
+    def assigned_problem(self, start: StageResult, members: Sequence[int]) -> AssignedProblem:
+        """The problem over the parts, for some of the designs."""
+        constraints = self.settings.constraints
+        if constraints is not None and len(members) < len(self.dataset.designs):
+            offsets = self.dataset.offsets
+            constraints = constraints.among(
+                np.concatenate([np.arange(offsets[n], offsets[n + 1]) for n in members])
+            )
+        return AssignedProblem(
+            self.dataset.subset(members),
+            start.kit,
+            restrict(start.assignment, self.dataset, members),
+            self.settings.bounds,
+            constraints,
+        )
+
+    def built_from(
+        self,
+        kit: Kit,
+        assignment: Assignment,
+        start: Sequence[Evaluation],
+        free: np.ndarray | None = None,
+        path_steps: int | None = None,
+    ) -> StageResult:
+        """All designs followed from evaluations to the parts of another kit or assignment; not
+        confirmed yet.
+
+        free : (k,) new values of the parameters of no element; default: they stay
+        path_steps : default: the settings'
+        """
+        designs, jumps = self._to_parts(start, kit, assignment, free, path_steps)
+        return self._result(designs, kit, assignment, jumps=jumps)
+
+    def judged(self, result: StageResult) -> StageResult:
+        """The same result with the objective of its designs."""
+        return replace(result, value=self._value(result.designs))
+
+    def confirmed(self, result: StageResult) -> StageResult:
+        """The same result at Exudyn's own solutions; a design that Exudyn doesn't confirm becomes a
+        failure."""
+        found = {n: d for n, d in enumerate(result.designs) if isinstance(d, Evaluation)}
+        designs = list(result.designs)
+        for n, evaluation in self.dataset.confirm(found).items():
+            designs[n] = evaluation
+        return self.judged(replace(result, designs=designs))
+
+    def redeployed(self, result: StageResult) -> list[Evaluation | SimulationFailure]:
+        """Every design built of the result's parts and deployed from its own starting geometry."""
+        places = [
+            d.q if isinstance(d, Evaluation) else design.parameters
+            for d, design in zip(result.designs, self.dataset.designs)
+        ]
+        q = self._realised(result.kit, result.assignment, np.concatenate(places)[self.dataset.free])
+        found = self.dataset.redeploy(q, range(len(result.designs)))
+        return [found[n] for n in range(len(result.designs))]
+
+    def to_parts(
+        self, relaxed: StageResult, fixed_kit: bool = False
+    ) -> tuple[StageResult, StageResult]:
+        """Follow the straight path from the relaxed elements to their parts, watching for snaps.
+
+        When a design fails, w_c is raised and the relaxed stage goes on from where it was; also
+        when one snaps, unless the rounds of the assigned stage are to make up for that. Returns the
+        relaxed result that the path started from in the end, and the state at the parts.
+        """
+        settings = self.settings
+        attempts = settings.rescues + (0 if fixed_kit else settings.growth)
+        for attempt in range(attempts + 1):
+            designs, jumps = self._to_parts(relaxed.evaluations, relaxed.kit, relaxed.assignment)
+            failed = [d for d in designs if isinstance(d, SimulationFailure)]
+            for jump in jumps:
+                log.warning(
+                    "%s snaps at %.0f %% of the way to its parts (%.1f %% of its size)",
+                    jump.design,
+                    100 * jump.fraction,
+                    100 * jump.distance,
+                )
+            for failure in failed:
+                log.warning("%s", failure)
+            needed = failed or jumps and not settings.reassignments
+            if not needed or attempt == attempts:
+                break
+            relaxed = self._rescued(relaxed, attempt, jumps, fixed_kit)
+        return relaxed, self.confirmed(
+            self._result(designs, relaxed.kit, relaxed.assignment, jumps=jumps)
+        )
+
+    def _rescued(
+        self, relaxed: StageResult, attempt: int, jumps: list[Jump], fixed_kit: bool
+    ) -> StageResult:
+        """The relaxed stage again from its end: with w_c raised, later with one more part of every
+        kind."""
+        settings, kit, q = (
+            self.settings,
+            relaxed.kit,
+            np.concatenate([e.q for e in relaxed.evaluations]),
+        )
+        if attempt < settings.rescues:
+            weight = self.schedule[-1] * 10 ** (attempt + 1)
+            log.warning("raising w_c to %g", weight)
+        else:
+            weight = self.schedule[-1]
+            sizes = {kind: count + 1 for kind, count in kit.sizes.items()}
+            log.warning("one more part of every kind: %s", sizes)
+            kit = cluster(
+                self.dataset.groups,
+                q,
+                sizes,
+                bounds=settings.bounds,
+                restarts=settings.restarts,
+                seed=settings.seed,
+            ).kit
+        result, _ = self._relax(
+            f"rescue-{attempt + 1}", weight, q, relaxed.evaluations, kit, fixed_kit
+        )
+        data = result.point.data
+        return StageResult(
+            list(data.evaluations),
+            data.kit,
+            data.assignment,
+            relaxed.steps + result.steps,
+            result.point.value,
+            result.status,
+            relaxed.jumps + jumps,
+        )
+
+    # -- pieces --------------------------------------------------------------------------------
+    def _relax(
+        self,
+        name: str,
+        weight: float,
+        q: np.ndarray,
+        evaluations: Sequence[Evaluation],
+        kit: Kit,
+        fixed_kit: bool,
+    ) -> tuple[SQPResult, RelaxedProblem]:
+        settings = self.settings
+        problem = RelaxedProblem(
+            self.dataset,
+            self.projection.with_weight(weight),
+            kit,
+            settings.bounds,
+            settings.constraints,
+            fixed_kit,
+        )
+        options = SQPOptions(
+            hessian=settings.hessian,
+            max_steps=settings.relaxed_steps,
+            decrease_tolerance=settings.last_tolerance
+            if weight >= self.schedule[-1]
+            else settings.relaxed_tolerance,
+        )
+        return self._sqp(
+            name, problem, problem.point(q, list(evaluations), kit), options, weight
+        ), problem
+
+    def _sqp(
+        self, name: str, problem: Any, start: Point, options: SQPOptions, weight: float | None
+    ) -> SQPResult:
+        """Minimise, or go on from the store's checkpoint of that name."""
+        tally = problem.dataset.tally
+        before = (tally.equilibria, tally.newton_iterations)
+        state, saved = None, self.store.load(name)
+        terms: list[str] = []
+        if saved is not None:
+            try:
+                state, start, terms = _restored(problem, saved)
+                equilibria, iterations = saved["tally"].astype(int).tolist()
+            # some array is missing or of another shape
+            except (IndexError, KeyError, TypeError, ValueError):
+                raise InputError(
+                    f"the checkpoint {name!r} is damaged: start anew instead of resuming"
+                ) from None
+            tally.equilibria += equilibria
+            tally.newton_iterations += iterations
+            for record, row in zip(state.history, terms):
+                self.observer(StageEvent(name, record, json.loads(row), weight))
+
+        def checkpoint(state: SQPState, point: Point) -> None:
+            terms.append(json.dumps(point.data.terms))
+            self.observer(StageEvent(name, state.history[-1], point.data.terms, weight))
+            self.store.save(
+                name,
+                {
+                    **{f"sqp/{k}": v for k, v in state.to_arrays().items()},
+                    **{
+                        f"states/{k}": v
+                        for k, v in evaluations_to_arrays(point.data.solved).items()
+                    },
+                    "kit": point.data.kit.vector,
+                    "terms": np.array(terms),
+                    "tally": np.array(
+                        [tally.equilibria - before[0], tally.newton_iterations - before[1]]
+                    ),
+                },
+            )
+
+        result = minimise(
+            problem, start.x, options, checkpoint=checkpoint, state=state, start=start
+        )
+        log.info(
+            "%s: %d steps, J = %.6g, %s", name, result.steps, result.point.value, result.status
+        )
+        return result
+
+    def _realised(self, kit: Kit, assignment: Assignment, free: np.ndarray) -> np.ndarray:
+        """(n_q,) every element its part, and the parameters of no element (k,) as given."""
+        q = assignment.matrix(kit) @ kit.vector
+        q[self.dataset.free] = free
+        return q
+
+    def _to_parts(
+        self,
+        start: Sequence[Evaluation],
+        kit: Kit,
+        assignment: Assignment,
+        free: np.ndarray | None = None,
+        path_steps: int | None = None,
+    ) -> tuple[list[Evaluation | SimulationFailure], list[Jump]]:
+        """Follow all designs to their parts; one that fails on the way is deployed there from
+        scratch instead."""
+        if free is None:
+            free = np.concatenate([e.q for e in start])[self.dataset.free]
+        q = self._realised(kit, assignment, free)
+        outcomes = self.dataset.follow(q, start, path_steps or self.settings.path_steps)
+        designs: list[Evaluation | SimulationFailure] = []
+        jumps = []
+        for n, path in enumerate(outcomes):
+            if isinstance(path, SimulationFailure):
+                designs.append(path)
+                continue
+            jump = find_jump(
+                self.dataset.designs[n], start[n], path, self.dataset.references[n].target.diagonal
+            )
+            jumps += [jump] if jump is not None else []
+            designs.append(path[-1])
+        failed = [n for n, d in enumerate(designs) if isinstance(d, SimulationFailure)]
+        for n, evaluation in self.dataset.redeploy(q, failed).items():
+            if isinstance(evaluation, Evaluation):
+                designs[n] = evaluation
+        return designs, jumps
+
+    def _result(
+        self,
+        designs: list[Evaluation | SimulationFailure],
+        kit: Kit,
+        assignment: Assignment,
+        steps: int = 0,
+        status: str = "",
+        jumps: Sequence[Jump] = (),
+    ) -> StageResult:
+        return StageResult(
+            designs, kit, assignment, steps, self._value(designs), status, list(jumps)
+        )
+
+    def _value(self, designs: Sequence[Evaluation | SimulationFailure]) -> float | None:
+        """The objective, where no design failed."""
+        found = [design for design in designs if isinstance(design, Evaluation)]
+        return self.dataset.value(found) if len(found) == len(designs) else None
+
+
+def _restored(problem: Any, saved: Mapping[str, np.ndarray]) -> tuple[SQPState, Point, list[str]]:
+    """State, point and the steps' terms of a checkpoint."""
+    state = SQPState.from_arrays({k[4:]: v for k, v in saved.items() if k.startswith("sqp/")})
+    evaluations = evaluations_from_arrays(
+        problem.dataset, {k[7:]: v for k, v in saved.items() if k.startswith("states/")}
+    )
+    point = (
+        problem.point(state.x, evaluations, problem.kit.with_vector(saved["kit"]))
+        if isinstance(problem, RelaxedProblem)
+        else problem.point(state.x, evaluations)
+    )
+    return state, point, [str(row) for row in saved["terms"]]

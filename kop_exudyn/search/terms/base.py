@@ -1,0 +1,100 @@
+"""What a term of a design's objective offers: its value in a state, and its derivatives there."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, TypeVar
+
+import numpy as np
+
+from ...equilibrium.newton import Equilibrium
+from ...equilibrium.sensitivities import Sensitivities
+from ...errors import InputError
+from ...plugins import load_folder
+from ...structures.base import Design, Role, Target
+from ...structures.fitting import FitResult
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What a design is compared with, from its input parameters.
+
+    target : the shape to keep
+    energy : E0, the input design's elastic energy in the fitted state
+    equilibria : of the input design, by role
+    """
+
+    target: Target
+    energy: float
+    equilibria: Mapping[str, Equilibrium]
+
+
+class Term(ABC):
+    """One term of one design's objective: a sum over the states (roles) that it looks at, of values
+    without units.
+
+    name : under which weights and files know it
+
+    Raises InputError when the term can't be judged for this design, which then needs the weight 0.
+    """
+
+    name: ClassVar[str]
+
+    def __init__(self, design: Design, reference: Reference):
+        self.design, self.reference = design, reference
+
+    def sees(self, role: Role) -> bool:
+        """Whether the term looks at the states of this role; default: at all."""
+        return True
+
+    def label(self, role: Role) -> str:
+        """What histories and results call the term's share of this role."""
+        return f"{self.name} {role.name}"
+
+    @abstractmethod
+    def value(self, role: Role, equilibrium: Equilibrium, fit: FitResult) -> float:
+        """The term in an equilibrium, whose joints (in the fitted role) were compared with the
+        target."""
+
+    @abstractmethod
+    def gradient(self, role: Role, sensitivities: Sensitivities, fit: FitResult) -> np.ndarray:
+        """(nq,) its exact derivative in the parameters, by the adjoint method."""
+
+    @abstractmethod
+    def model(
+        self, role: Role, sensitivities: Sensitivities, fit: FitResult
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Its gradient (nq,) and Hessian (nq, nq), or a positive semidefinite model of that
+        (Gauss-Newton)."""
+
+
+_REGISTRY: dict[str, type[Term]] = {}
+_Term = TypeVar("_Term", bound=type[Term])
+
+
+def register(term: _Term) -> _Term:
+    """Make a term known under its name; decorates the class."""
+    _REGISTRY[term.name] = term
+    return term
+
+
+def term_names() -> list[str]:
+    """Names of all terms: those that every objective has first, then the others, sorted."""
+    load_folder(__package__)
+    first = ["fit", "energy"]
+    return first + sorted(set(_REGISTRY) - set(first))
+
+
+def term_class(name: str) -> type[Term]:
+    """The term of that name; InputError when there is none."""
+    if name not in _REGISTRY:
+        load_folder(__package__)
+    if name not in _REGISTRY:
+        raise InputError(
+            f"unknown term of the objective (known: {', '.join(term_names())})",
+            field="weights",
+            value=name,
+        )
+    return _REGISTRY[name]

@@ -1,0 +1,127 @@
+"""The largest stresses of every state, smoothed so that they can be differentiated: for designs
+close to yielding.
+
+With N, M_t, M_y, M_z in the middle of a rod element, and y, z the section's farthest points,
+
+    u = (N / A)^2 + (M_y z / I_y)^2 + (M_z y / I_z)^2 + 3 (M_t W / J)^2
+
+is between a third of and the whole of the square of the equivalent stress at a corner
+(analysis/strength.py has that one, exactly). The term is the p-mean of the stress over the rods'
+length, squared, and over that of the input design:
+
+    S / S0,  S = (sum_e L_e u_e^(p/2) / sum_e L_e)^(2/p)
+
+which tends to the largest u with growing p (Le, Norato, Bruns, Ha, Tortorelli, Struct. Multidisc.
+Optim. 41, 2010).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...equilibrium.newton import Equilibrium
+from ...equilibrium.sensitivities import Sensitivities
+from ...errors import InputError
+from ...scene.scene import Scene
+from ...structures.base import Design, Role
+from ...structures.fitting import FitResult
+from .base import Reference, Term, register
+
+_P = 8  # close enough to the maximum, and the curvature still bounded
+
+
+@register
+class Stress(Term):
+    """S / S0 in every state that is solved, S0 that of the input design's fitted state."""
+
+    name = "stress"
+
+    def __init__(self, design: Design, reference: Reference):
+        super().__init__(design, reference)
+        self._forms = {
+            role.name: _quadratic_forms(design.scene(role.name)) for role in design.roles
+        }
+        if not all(form.any() for form in self._forms.values()):
+            raise InputError(
+                "the rods' cross-sections aren't known", source=design.name, field="weights.stress"
+            )
+        fitted = design.fitted_role
+        self._scale = 1.0
+        self._scale = self.value(fitted, reference.equilibria[fitted.name])
+        if not self._scale > 0:
+            raise InputError(
+                "the input design has no stress to compare with",
+                source=design.name,
+                field="weights.stress",
+            )
+
+    def value(self, role: Role, equilibrium: Equilibrium, fit: FitResult | None = None) -> float:
+        return _p_mean(*self._squares(role, equilibrium)) / self._scale
+
+    def gradient(self, role: Role, sensitivities: Sensitivities, fit: FitResult) -> np.ndarray:
+        return sensitivities.stress_adjoint(self._by_stress(role, sensitivities.equilibrium)[0])
+
+    def model(
+        self, role: Role, sensitivities: Sensitivities, fit: FitResult
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Gauss-Newton: exact in the stresses, in which the term is convex; their own curvature is
+        left out."""
+        slope, curvature, along, less = self._by_stress(role, sensitivities.equilibrium)
+        stresses_q = sensitivities.stresses
+        gradient = np.einsum("er,erq->q", slope, stresses_q)
+        rows = (np.sqrt(curvature)[:, :, None] * stresses_q).reshape(-1, stresses_q.shape[2])
+        across = np.einsum("er,erq->eq", along, stresses_q)
+        return gradient, rows.T @ rows + across.T @ across - less * np.outer(gradient, gradient)
+
+    def _squares(self, role: Role, equilibrium: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
+        """u (E,) and the elements' shares (E,) of the rods' length."""
+        form = self._forms[role.name]
+        lengths = self.design.scene(role.name).rest_lengths(equilibrium.q)
+        share = np.where(form.any(axis=1), lengths, 0.0)
+        return np.einsum("er,er->e", form, equilibrium.stress**2), share / share.sum()
+
+    def _by_stress(
+        self, role: Role, equilibrium: Equilibrium
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+        """dS/ds (E, 6), and the parts of d2S/ds2: a diagonal (E, 6), a vector (E, 6) an element,
+        and of dS/ds itself."""
+        form = self._forms[role.name]
+        u, share = self._squares(role, equilibrium)
+        value = _p_mean(u, share) / self._scale
+        relative = u / (value * self._scale or 1.0)
+        weight = share * relative ** (_P / 2 - 1) / self._scale
+        slope = 2 * weight[:, None] * form * equilibrium.stress
+        bend = (
+            4 * (_P / 2 - 1) * share * relative ** (_P / 2 - 2) / (self._scale**2 * (value or 1.0))
+        )
+        return (
+            slope,
+            2 * weight[:, None] * form,
+            np.sqrt(bend)[:, None] * form * equilibrium.stress,
+            (_P / 2 - 1) / (value or 1.0),
+        )
+
+
+def _p_mean(u: np.ndarray, share: np.ndarray) -> float:
+    """S of squares u (E,), in which no power overflows."""
+    largest = u.max(initial=0.0)
+    return largest * float(share @ (u / (largest or 1.0)) ** (_P / 2)) ** (2 / _P)
+
+
+def _quadratic_forms(scene: Scene) -> np.ndarray:
+    """(E, 6) factors of the squared generalised stresses in u; zero where an element has no
+    section."""
+    forms = np.zeros((len(scene.elements), 6))
+    for chain in scene.chains:
+        section = chain.section
+        if section is not None:
+            y, z = np.abs(section.outline).max(axis=0)
+            forms[chain.elements] = (
+                1 / section.area**2,
+                0,
+                0,
+                3 * (section.torsion_modulus / section.torsion) ** 2,
+                (z / section.inertia_y) ** 2,
+                (y / section.inertia_z) ** 2,
+            )
+    return forms

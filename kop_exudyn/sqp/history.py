@@ -1,0 +1,111 @@
+"""What the SQP solver did: a record for each accepted step, and the state from which it can go
+on."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+
+import numpy as np
+
+from ..errors import InputError
+
+
+@dataclass(frozen=True)
+class StepRecord:
+    """One accepted step.
+
+    step : its number, from 1
+    value : objective after it
+    gradient_norm : projected gradient before it, in scaled variables
+    predicted, actual : reduction of the objective by the model and in truth
+    damping : multiple of diag(1/scale^2) that the trust region added to the Hessian
+    radius : trust radius that the step was taken with; length : of the step; both in scaled
+        variables
+    trials, failures : points evaluated for this step, and those of them that could not be simulated
+    active : bounds and constraints that push
+    convexified : whether the model Hessian was indefinite and had to be modified
+    solver : the QP solver used
+    seconds : wall time by phase, of ``derivatives``, ``qp`` and ``evaluate``
+    """
+
+    step: int
+    value: float
+    gradient_norm: float
+    predicted: float
+    actual: float
+    damping: float
+    radius: float
+    length: float
+    trials: int
+    failures: int
+    active: int
+    convexified: bool
+    solver: str
+    seconds: dict[str, float]
+
+
+@dataclass(frozen=True)
+class SQPState:
+    """All that a run needs to go on exactly as if it had not been interrupted; plain arrays and
+    numbers.
+
+    x : (n,) last accepted point;  radius : trust radius;  step : accepted steps so far
+    gradient_scale : projected gradient at the start, which tolerances refer to
+    y, z : multipliers of the last QP, its next warm start
+    quasi_newton : arrays of BlockBFGS, empty with exact Hessians
+    """
+
+    x: np.ndarray
+    radius: float
+    step: int = 0
+    evaluations: int = 0
+    failures: int = 0
+    gradient_scale: float = 0.0
+    y: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    z: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    quasi_newton: dict[str, np.ndarray] = field(default_factory=dict)
+    history: tuple[StepRecord, ...] = ()
+
+    def to_arrays(self) -> dict[str, np.ndarray]:
+        """For ``numpy.savez``; no pickling needed."""
+        numbers = np.array(
+            [self.radius, self.step, self.evaluations, self.failures, self.gradient_scale]
+        )
+        arrays = {"x": self.x, "numbers": numbers, "y": self.y, "z": self.z}
+        arrays["history"] = np.array(json.dumps([asdict(record) for record in self.history]))
+        return arrays | {f"quasi_newton.{name}": value for name, value in self.quasi_newton.items()}
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, np.ndarray]) -> SQPState:
+        """The state that ``to_arrays`` came from, bit for bit. Raises InputError for arrays of
+        something else."""
+        try:
+            return cls._from_arrays(arrays)
+        # ValueError: also that of the JSON reader
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(
+                f"not the state of an optimisation ({type(error).__name__})", field="sqp"
+            ) from None
+
+    @classmethod
+    def _from_arrays(cls, arrays: dict[str, np.ndarray]) -> SQPState:
+        radius, step, evaluations, failures, gradient_scale = arrays["numbers"]
+        quasi_newton = {
+            name.removeprefix("quasi_newton."): np.array(arrays[name])
+            for name in arrays
+            if name.startswith("quasi_newton.")
+        }
+        records = tuple(StepRecord(**record) for record in json.loads(str(arrays["history"])))
+        return cls(
+            np.array(arrays["x"]),
+            float(radius),
+            int(step),
+            int(evaluations),
+            int(failures),
+            float(gradient_scale),
+            np.array(arrays["y"]),
+            np.array(arrays["z"]),
+            quasi_newton,
+            records,
+        )

@@ -1,0 +1,243 @@
+"""C-shells: planar networks of curved rods that open into space when their joints are turned.
+
+The smooth design (pre-curved rods, unstressed in the plane) is deployed by its mean joint angle
+through the out-of-plane bifurcation and gives the target. The straightened design (straight pieces,
+one corner between neighbouring joints) has the element parameters; its deployed and its assembly
+("rest") state enter the objective.
+
+The rest state lies on the floor by default (planar: out-of-plane freedoms removed), at the
+network's own mean joint angle: many networks are mechanisms in the plane, whose rest state would be
+undetermined without it. Option "imperfect" lets it leave the plane instead, from a tiny
+imperfection that unfolds the pitchfork.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CloughTocher2DInterpolator
+from scipy.spatial import Delaunay
+
+from ...equilibrium.newton import Equilibrium, NewtonOptions, Start, solve
+from ...equilibrium.system import System
+from ...errors import InputError, SimulationFailure
+from ...geometry.network import CurveNetwork, network_from_dict
+from ...geometry.network_faces import triangulate
+from ...geometry.triangles import TriangleSurface
+from ...rods.sections import material_from_dict, section_from_dict
+from ...scene.scene import Scene
+from ..base import Design, Role, Target, register
+from ..mesh_target import load_target_mesh, target_on_mesh
+from .scene import RodModel, lay_out, shell_scene
+
+_OPENING_STEP = 0.1  # rad of mean joint angle a step
+_LARGEST_CORNER = 2.5  # rad
+_IMPERFECTION = 1e-3  # of the size, height of the shallow surface that imperfect rest shapes follow
+_REFINEMENTS = 3  # of the target's triangles
+_INWARD = 1e-6  # of the way to the middle
+
+
+class CShell(Design):
+    """One C-shell.
+
+    network : the planar network; model : how its rods are modelled
+    opening : rad, change of the mean opening angle from assembly to deployment
+    side : 1 or -1, to which side of the plane it rises
+    rest : "planar" or "imperfect", see the module
+    target_mesh : surface to keep to, instead of the surface through the smooth design's deployed
+        rods
+
+    Raises InputError where one corner can't follow the curve between two joints, or the curves
+    enclose no face.
+    """
+
+    class_name = "c_shell"
+
+    def __init__(
+        self,
+        name: str,
+        network: CurveNetwork,
+        model: RodModel,
+        opening: float,
+        *,
+        side: int = 1,
+        rest: str = "planar",
+        target_mesh: TriangleSurface | None = None,
+    ):
+        self.name, self.network, self.model = name, network, model
+        self.opening, self.side, self.rest, self.target_mesh = opening, side, rest, target_mesh
+        self.layout = lay_out(network, model.elements)
+        numbering = self.layout.numbering
+        self.parameters, self.groups, self.joints = (
+            numbering.parameters,
+            numbering.groups,
+            self.layout.joints,
+        )
+        self.lower, self.upper = numbering.bounds(_LARGEST_CORNER)
+        self._triangles = triangulate(network)
+        flat, straight = self.layout.hinges[:, network.opens].mean(axis=1)
+        self.flat_angle = float(flat)
+        self.roles = (
+            Role("deployed", self.flat_angle + opening, fitted=True),
+            Role("rest", float(straight)),
+        )
+
+    def scene(self, role: str) -> Scene:
+        return self._scenes[role]
+
+    @cached_property
+    def _scenes(self) -> dict[str, Scene]:
+        planar = self.rest == "planar"
+        return {
+            "deployed": shell_scene(self.layout, self.model, straight=True),
+            "rest": shell_scene(
+                self.layout,
+                self.model,
+                straight=True,
+                planar=planar,
+                imperfection=0.0 if planar else self.side * _IMPERFECTION,
+            ),
+        }
+
+    @cached_property
+    def smooth(self) -> Scene:
+        """The smooth design's scene."""
+        return shell_scene(self.layout, self.model, straight=False)
+
+    @cached_property
+    def smooth_path(self) -> list[Equilibrium]:
+        """The smooth design's equilibria from the flat network to the opening, in steps of about
+        0.1 rad."""
+        return open_up(System(self.smooth), self.flat_angle, self.opening, self.side)
+
+    def deploy(self, q: np.ndarray | None = None) -> dict[str, Equilibrium]:
+        """Deployed from the smooth design's deployed state (the same branch), rest from the flat
+        network."""
+        q = self.parameters if q is None else q
+        path = self.smooth_path
+        starts = {
+            "deployed": Start(
+                self.layout.straightened(path[-1].state, self.scene("deployed")), path[-1].torque
+            ),
+            "rest": Start(self.scene("rest").initial),
+        }
+        found = {}
+        for role in self.roles:
+            try:
+                found[role.name] = solve(
+                    self.systems[role.name], q, starts[role.name], role.opening
+                )
+            except SimulationFailure as failure:
+                raise failure.within(f"{role.name} state") from None
+        return {**found, "deployed": found["deployed"].after(*path)}
+
+    @cached_property
+    def target(self) -> Target:
+        """The surface through the smooth design's deployed rods: the network's faces, refined and
+        lifted; or a mesh.
+
+        Lifted by the C1 Clough-Tocher interpolant of all rod nodes, it passes through every joint;
+        the bare triangles between joints would have creases exactly where the joints are.
+        """
+        state, flat = self.smooth_path[-1].state, self.layout.smooth[:, :2]
+        if self.target_mesh is not None:
+            return target_on_mesh(self.target_mesh, state.positions[self.joints])
+        vertices, faces = self.network.joints, self._triangles
+        for _ in range(_REFINEMENTS):
+            vertices, faces = _split(vertices, faces)
+        lift = CloughTocher2DInterpolator(Delaunay(flat), state.positions, tol=1e-10)
+        lifted = lift(vertices)
+        joints = state.positions[self.joints]
+        lifted[: len(joints)] = joints  # exact there; the rest lies inside the flat hull,
+        outside = np.isnan(lifted).any(axis=1)  # but for round-off beside straight outer curves
+        lifted[outside] = lift(
+            vertices[outside] + _INWARD * (flat.mean(axis=0) - vertices[outside])
+        )
+        used = np.unique(faces)
+        faces = np.searchsorted(used, faces)
+        return Target(
+            lifted[used], faces, joints, float(np.linalg.norm(np.ptp(lifted[used], axis=0)))
+        )
+
+
+def open_up(system: System, flat: float, opening: float, side: int) -> list[Equilibrium]:
+    """Open a smooth design by its mean opening angle, through the bifurcation to the chosen side of
+    the plane.
+
+    flat : the mean angle of the flat network, the scene's initial state
+    """
+    scene = system.scene
+    steps = max(1, int(np.ceil(abs(opening) / _OPENING_STEP - 1e-9)))
+    heights = np.zeros(scene.n_dofs)
+    heights[: 6 * scene.n_bodies].reshape(-1, 6)[:, 2] = side * _bulge(scene.initial.positions)
+    options = NewtonOptions(side=heights[system.sparsity.free])
+    path = [solve(system, np.empty(0), None, flat, options)]
+    for step in range(1, steps + 1):
+        angle = flat + opening * step / steps
+        try:
+            path.append(solve(system, np.empty(0), path[-1], angle, options))
+        except SimulationFailure as failure:
+            raise failure.within(f"smooth design, mean opening angle {angle:.3f} rad") from None
+    return path
+
+
+def _bulge(x: np.ndarray) -> np.ndarray:
+    """A height field (n,) that no symmetric buckling mode, even or odd, is orthogonal to: for
+    choosing a side."""
+    y = (x[:, :2] - x[:, :2].mean(axis=0)) / np.ptp(x[:, :2], axis=0).max()
+    r = (y**2).sum(axis=1)
+    odd = r * (0.5 * y[:, 0] + 0.3 * y[:, 1])
+    height = r + 0.7 * (y[:, 0] ** 2 - y[:, 1] ** 2) + 0.3 * y[:, 0] * y[:, 1] + odd
+    return height - height.mean()
+
+
+def _split(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Every triangle into four, at the middles of its edges."""
+    n = len(vertices)
+    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    unique, number = np.unique(edges, axis=0, return_inverse=True)
+    m = n + number.reshape(-1, 3)
+    a, b, c = faces.T
+    parts = [
+        np.stack(t, axis=1)
+        for t in (
+            (a, m[:, 0], m[:, 2]),
+            (m[:, 0], b, m[:, 1]),
+            (m[:, 2], m[:, 1], c),
+            (m[:, 0], m[:, 1], m[:, 2]),
+        )
+    ]
+    return np.concatenate([vertices, vertices[unique].mean(axis=1)]), np.concatenate(parts)
+
+
+@register("c_shell")
+def read_c_shell(data: Mapping[str, Any], source: str) -> CShell:
+    """The C-shell of a design file's content (see c_shell.schema.json). Raises InputError."""
+    try:
+        model = RodModel(
+            section_from_dict(data["section"]),
+            material_from_dict(data["material"]),
+            float(data.get("rod_offset", 0.0)),
+            int(data.get("elements_per_piece", 2)),
+        )
+        opening = data["opening"]
+        mesh = (
+            load_target_mesh(Path(source).parent / data["target"]["file"])
+            if "target" in data
+            else None
+        )
+        return CShell(
+            data["name"],
+            network_from_dict(data),
+            model,
+            float(opening["angle"]),
+            side=-1 if opening.get("side") == "down" else 1,
+            rest=data.get("rest", "planar"),
+            target_mesh=mesh,
+        )
+    except InputError as error:
+        raise error.at(source) from None

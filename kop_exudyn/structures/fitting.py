@@ -1,0 +1,272 @@
+"""Target fitting: how far joints are from a target surface and from their target positions, at best
+placement.
+
+T(x) = share sum_i w_i |y_i - x*_i|^2 + (1 - share) sum_i w_i |y_i - P(y_i)|^2, minimised over rigid
+placements y = R x + t, with P the closest point on the surface and weights w that sum to one. As
+the placement is a minimiser, the gradient in x needs no derivative of it; the Hessian does, by
+Schur complement.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ..errors import InputError
+from ..geometry.triangles import Closest, TriangleSurface
+from .base import Target
+
+_MAX_ITERATIONS = 100
+# of the joints' size; Newton converges quadratically, the step after that is round-off
+_STEP_TOLERANCE = 1e-10
+# relative: rigid motions that no residual sees, as turning collinear joints about their line
+_DEGENERATE = 1e-10
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Rigid motion y = R x + t: rotation (3, 3), translation (3,)."""
+
+    rotation: np.ndarray
+    translation: np.ndarray
+
+    def apply(self, points: np.ndarray) -> np.ndarray:
+        """Placed points (n, 3)."""
+        return points @ self.rotation.T + self.translation
+
+    def moved(self, centre: np.ndarray, turn: np.ndarray, shift: np.ndarray) -> Placement:
+        """This placement followed by a turn (rotation vector) about a point, and a shift."""
+        rotation = Rotation.from_rotvec(turn).as_matrix()
+        return Placement(
+            rotation @ self.rotation, rotation @ (self.translation - centre) + centre + shift
+        )
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """Target fitting of n joints.
+
+    value : T, length^2
+    gradient : (n, 3) dT/dx in the coordinates that the joints were given in
+    placement : the best one
+    distances : (n,) of the placed joints from the surface
+    displacements : (n,) of the placed joints from their own places in the target
+    diagonal : length that percentages refer to
+    blocks : (n, 3, 3) square root of the Hessian of T in each placed joint
+    motions : (3n, r) orthonormal basis of the weighted residual rows' change by rigid motions
+    """
+
+    value: float
+    gradient: np.ndarray
+    placement: Placement
+    distances: np.ndarray
+    displacements: np.ndarray
+    diagonal: float
+    blocks: np.ndarray
+    motions: np.ndarray
+
+    @property
+    def max_percent(self) -> float:
+        """Largest distance from the surface, % of the target's bounding-box diagonal."""
+        return 100 * float(self.distances.max()) / self.diagonal
+
+    @property
+    def mean_percent(self) -> float:
+        """Mean distance from the surface, % of the target's bounding-box diagonal."""
+        return 100 * float(self.distances.mean()) / self.diagonal
+
+    def weighted_rows(self, jacobian: np.ndarray) -> np.ndarray:
+        """R J (3n, m) for J = dx/dq (3n, m): the Gauss-Newton Hessian of T in q is (R J)^T (R
+        J)."""
+        n = len(self.blocks)
+        rows = ((self.blocks @ self.placement.rotation) @ jacobian.reshape(n, 3, -1)).reshape(
+            3 * n, -1
+        )
+        return rows - self.motions @ (self.motions.T @ rows)
+
+    def gauss_newton_factor(self) -> np.ndarray:
+        """R (3n, 3n), the factor of the Gauss-Newton Hessian R^T R of T in x, rigid motions
+        eliminated."""
+        return self.weighted_rows(np.eye(3 * len(self.blocks)))
+
+    def gauss_newton(self) -> np.ndarray:
+        """(3n, 3n) Gauss-Newton Hessian of T in x: exact but for terms that vanish with the
+        residual."""
+        factor = self.gauss_newton_factor()
+        return factor.T @ factor
+
+
+# joints (n, 3), closest points, T, dT/dy (n, 3)
+_Placed = tuple[np.ndarray, Closest, float, np.ndarray]
+
+
+class TargetFitting:
+    """Compares joints with a target; the search tree of the surface is built once.
+
+    share : weight of the target positions, in [0, 1]; the surface has the rest
+    weights : (n,) positive weights of the joints, all equal by default
+    Raises InputError for a share or weights that make no sense, and for unusable targets.
+    """
+
+    def __init__(self, target: Target, share: float = 0.1, weights: np.ndarray | None = None):
+        if not 0 <= share <= 1:
+            raise InputError("must lie in [0, 1]", field="share", value=share)
+        self.surface = TriangleSurface(target.vertices, target.faces)
+        self.positions = np.asarray(target.positions, dtype=float)
+        if (
+            self.positions.ndim != 2
+            or self.positions.shape[1] != 3
+            or not np.isfinite(self.positions).all()
+        ):
+            raise InputError(
+                "expected finite points of shape (n, 3)",
+                field="target.positions",
+                value=self.positions.shape,
+            )
+        self.diagonal, self.share = float(target.diagonal), float(share)
+        self.weights = _normalised(weights, len(self.positions))
+
+    def __call__(self, x: np.ndarray, placement: Placement | None = None) -> FitResult:
+        """Fit joints x (n, 3); the placement is searched from a given one, or from the best fit to
+        the positions."""
+        x = np.asarray(x, dtype=float)
+        if x.shape != self.positions.shape or not np.isfinite(x).all():
+            raise InputError(
+                f"expected {len(self.positions)} finite joints", field="joints", value=x.shape
+            )
+        placement = placement or best_placement(x, self.positions, self.weights)
+        found = self._evaluate(x, placement)
+        for _ in range(_MAX_ITERATIONS):
+            placement, found, step = self._newton_step(x, placement, found)
+            if step <= _STEP_TOLERANCE:
+                break
+        return self._result(placement, found)
+
+    def _newton_step(
+        self, x: np.ndarray, placement: Placement, found: _Placed
+    ) -> tuple[Placement, _Placed, float]:
+        """One safeguarded Newton step of the placement, what is found there, and its length
+        relative to the size."""
+        y, closest, value, gradient = found
+        centre, size, motions = self._motions(y)
+        slope = motions.T @ gradient.ravel()
+        hessian = self._placement_hessian(y - centre, closest, gradient, size, motions)
+        step = _descent(hessian, slope)
+        fraction = 1.0
+        while fraction > 1e-8:
+            turn, shift = fraction * step[:3] / size, fraction * step[3:]
+            trial = placement.moved(centre, turn, shift)
+            bound = value * (1 + 1e-14) + 1e-4 * fraction * float(slope @ step)
+            there = self._evaluate(x, trial)
+            if there[2] <= bound:
+                return trial, there, fraction * float(np.linalg.norm(step)) / size
+            fraction *= 0.5
+        return placement, found, 0.0
+
+    def _evaluate(self, x: np.ndarray, placement: Placement) -> _Placed:
+        """Placed joints, closest points, T and dT/dy (n, 3)."""
+        y = placement.apply(x)
+        closest = self.surface.closest(y)
+        to_position, to_surface = y - self.positions, y - closest.points
+        squares = self.share * np.sum(to_position**2, axis=1) + (1 - self.share) * np.sum(
+            to_surface**2, axis=1
+        )
+        gradient = (
+            2 * self.weights[:, None] * (self.share * to_position + (1 - self.share) * to_surface)
+        )
+        return y, closest, float(self.weights @ squares), gradient
+
+    def _motions(self, y: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
+        """Centre, size, and dy (3n, 6) of turns about the centre (times the size: all in lengths)
+        and of shifts."""
+        centre = self.weights @ y
+        arms = y - centre
+        size = float(np.sqrt(self.weights @ np.sum(arms**2, axis=1))) or self.diagonal
+        turns = np.cross(np.eye(3)[None], arms[:, None]) / size  # (n, axis, 3)
+        shifts = np.broadcast_to(np.eye(3), turns.shape)
+        return (
+            centre,
+            size,
+            np.concatenate([turns, shifts], axis=1).transpose(0, 2, 1).reshape(-1, 6),
+        )
+
+    def _placement_hessian(
+        self,
+        arms: np.ndarray,
+        closest: Closest,
+        gradient: np.ndarray,
+        size: float,
+        motions: np.ndarray,
+    ) -> np.ndarray:
+        """(6, 6) second derivatives of T in the motion: Gauss-Newton, plus the curvature of
+        rotations."""
+        rows = np.einsum("nij,njk->nik", self._blocks(closest), motions.reshape(-1, 3, 6)).reshape(
+            -1, 6
+        )
+        hessian = rows.T @ rows
+        moment = gradient.T @ arms
+        hessian[:3, :3] += (0.5 * (moment + moment.T) - np.trace(moment) * np.eye(3)) / size**2
+        return hessian
+
+    def _blocks(self, closest: Closest) -> np.ndarray:
+        """(n, 3, 3) square roots of d2T/dy_i2 = 2 w_i (share I + (1 - share) N), with the projector
+        N = I - dP/dx."""
+        normal = np.eye(3) - closest.derivative
+        root = np.sqrt(self.share) * closest.derivative + normal
+        return np.sqrt(2 * self.weights)[:, None, None] * root
+
+    def _result(self, placement: Placement, found: _Placed) -> FitResult:
+        y, closest, value, gradient = found
+        blocks = self._blocks(closest)
+        motions = self._motions(y)[2].reshape(-1, 3, 6)
+        rows = np.einsum("nij,njk->nik", blocks, motions).reshape(-1, 6)
+        basis, sizes, _ = np.linalg.svd(rows, full_matrices=False)
+        basis = basis[:, sizes > _DEGENERATE * sizes[0]]
+        return FitResult(
+            value,
+            gradient @ placement.rotation,
+            placement,
+            np.sqrt(closest.squared_distances),
+            np.linalg.norm(y - self.positions, axis=1),
+            self.diagonal,
+            blocks,
+            basis,
+        )
+
+
+def best_placement(x: np.ndarray, positions: np.ndarray, weights: np.ndarray) -> Placement:
+    """Rigid motion of least sum w |R x + t - positions|^2 (Kabsch, Acta Cryst. A32, 1976); weights
+    sum to one."""
+    centre, goal = weights @ x, weights @ positions
+    left, _, right = np.linalg.svd(((x - centre) * weights[:, None]).T @ (positions - goal))
+    turn = np.diag([1, 1, np.sign(np.linalg.det(left @ right))])
+    rotation = right.T @ turn @ left.T
+    return Placement(rotation, goal - rotation @ centre)
+
+
+def _descent(hessian: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    """Newton step with eigenvalues made positive, none along directions without stiffness."""
+    values, vectors = np.linalg.eigh(hessian)
+    stiff = np.abs(values) > _DEGENERATE * np.abs(values).max()
+    inverse = np.where(stiff, 1 / np.where(stiff, np.abs(values), 1), 0)
+    return -vectors @ (inverse * (vectors.T @ slope))
+
+
+def _normalised(weights: np.ndarray | None, n: int) -> np.ndarray:
+    if weights is None:
+        return np.full(n, 1 / n)
+    weights = np.asarray(weights, dtype=float)
+    if (
+        weights.shape != (n,)
+        or not np.isfinite(weights).all()
+        or np.any(weights < 0)
+        or weights.sum() == 0
+    ):
+        raise InputError(
+            f"expected {n} weights, not negative and not all zero",
+            field="weights",
+            value=weights.shape,
+        )
+    return weights / weights.sum()

@@ -1,0 +1,231 @@
+"""Orthogonal grids: upright lamellas on a surface, hinged about its normal where they cross.
+
+The design is a network of curves on a surface. Its lamellas are straightened (`lamellas`), and the
+state is the equilibrium that is reached from the lamellas' places on the design surface: there is
+no actuation. Parameters are the lengths from joints to corners, and the signed corner angles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import InputError, SimulationFailure
+from ...geometry.network import CurveNetwork
+from ...geometry.surfaces import AnalyticSurface, Surface
+from ...rods.sections import Material, Section, material_from_dict, section_from_dict
+from ..base import Design, Role, Target, register
+from ..loads import hold_in_place
+from .grid_network import network_on
+from .lamellas import straighten_on
+
+if TYPE_CHECKING:
+    from ...equilibrium.newton import Equilibrium
+    from ...scene.scene import Scene
+    from .scene import GridScene
+
+_LARGEST_CORNER = 1.5  # rad
+_TARGET_CELLS = 96  # of the target surface, along each parameter
+_MARGIN = 0.75  # of the longest span, by which the target goes beyond the outermost joints
+
+
+class Grid(Design):
+    """One orthogonal grid.
+
+    surface : the design surface
+    network : curves in its parameter plane
+    section : width across the lamella, in the tangent plane (thin); height along the normal
+    elements_per_piece : rod elements of each straight piece
+    held : joints that keep their places on the surface, by supports or an edge beam: their numbers,
+        "corners" (where two lamellas end) or "boundary" (where one ends); default: none, the grid
+        finds its own shape
+
+    Raises InputError for held joints that don't exist, or that lie on one line.
+    """
+
+    class_name = "grid"
+    fit_weight = 1e5
+    roles = (Role("deployed", fitted=True),)
+
+    def __init__(
+        self,
+        name: str,
+        surface: Surface,
+        network: CurveNetwork,
+        section: Section,
+        material: Material,
+        *,
+        elements_per_piece: int = 2,
+        held: str | Sequence[int] | None = None,
+    ):
+        self.name, self.surface, self.network = name, surface, network
+        self.section, self.material, self.elements_per_piece = section, material, elements_per_piece
+        self.straight = straighten_on(surface, network)
+        numbering = self.straight.numbering
+        self.parameters, self.groups = numbering.parameters, numbering.groups
+        self.lower, self.upper = numbering.bounds(_LARGEST_CORNER)
+        self.held = (
+            None if held is None else _held_joints(network, surface.points(network.joints), held)
+        )
+        self.joints = self._model.joints
+
+    @cached_property
+    def _model(self) -> GridScene:
+        from .scene import grid_scene
+
+        return grid_scene(
+            self.surface,
+            self.network,
+            self.straight,
+            self.section,
+            self.material,
+            self.elements_per_piece,
+            self.held,
+        )
+
+    def scene(self, role: str = "deployed") -> Scene:
+        return self._model.scene
+
+    def deploy(self, q: np.ndarray | None = None) -> dict[str, Equilibrium]:
+        """The equilibrium nearest to the design surface: solved from the lamellas' places there."""
+        from ...equilibrium.newton import solve
+
+        try:
+            return {
+                "deployed": solve(self.systems["deployed"], self.parameters if q is None else q)
+            }
+        except SimulationFailure as failure:
+            hint = (
+                ""
+                if self.held is not None
+                else (
+                    "; a grid that nothing holds may shear without resistance, as on a dome: see "
+                    'the field "held"'
+                )
+            )
+            raise SimulationFailure(f"{failure.reason}{hint}", where="deployed state") from None
+
+    @cached_property
+    def target(self) -> Target:
+        """The design surface around the grid, finely triangulated; positions: the joints on it, as
+        they were drawn.
+
+        The diagonal is that of the joints' bounding box: the surface itself may go on.
+        """
+        joints = self.surface.points(self.network.joints)
+        vertices, faces = _triangulated(
+            self.surface, self.network, joints, _MARGIN * self._longest_span()
+        )
+        return Target(vertices, faces, joints, float(np.linalg.norm(np.ptp(joints, axis=0))))
+
+    def _longest_span(self) -> float:
+        return max(float(lamella.spans.lengths.max()) for lamella in self.straight.lamellas)
+
+
+def _held_joints(
+    network: CurveNetwork, points: np.ndarray, held: str | Sequence[int]
+) -> np.ndarray:
+    """(k,) the joints that keep their places, sorted. Raises InputError."""
+    if isinstance(held, str):
+        ends = np.bincount(
+            [
+                joint
+                for strand in network.strands
+                for joint in (strand.joints[0], strand.joints[-1])
+                if not strand.closed
+            ],
+            minlength=len(points),
+        )
+        least = {"boundary": 1, "corners": 2}.get(held)
+        if least is None:
+            raise InputError(
+                'expected numbers of joints, "corners" or "boundary"', field="held", value=held
+            )
+        found = np.flatnonzero(ends >= least)
+    else:
+        found = np.unique(np.asarray(held, int))
+        unknown = found[(found < 0) | (found >= len(points))]
+        if len(unknown):
+            raise InputError(
+                f"names a joint that doesn't exist (joints 0 to {len(points) - 1})",
+                field="held",
+                value=int(unknown[0]),
+            )
+    if not hold_in_place(points[found]):
+        raise InputError("joints on one line don't hold a grid", field="held", value=found.tolist())
+    return found
+
+
+def _triangulated(
+    surface: Surface, network: CurveNetwork, joints: np.ndarray, margin: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (V, 3) and faces (F, 3) of the surface where it is closer than 2 margins to a joint.
+
+    The parameter rectangle of the joints is widened by about one margin where the surface goes on.
+    """
+    from scipy.spatial import cKDTree
+
+    uv = network.joints
+    metric = surface.at(uv).metric
+    widening = margin / np.sqrt(metric[:, [0, 1], [0, 1]].min(axis=0))
+    axes = [
+        np.linspace(low, high, _TARGET_CELLS + 1)
+        for low, high in zip(
+            np.maximum(uv.min(axis=0) - widening, surface.lower),
+            np.minimum(uv.max(axis=0) + widening, surface.upper),
+        )
+    ]
+    n = _TARGET_CELLS + 1
+    plane = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    usable = surface.contains(plane)
+    vertices = np.full((len(plane), 3), np.inf)
+    vertices[usable] = surface.points(plane[usable])
+    usable &= np.isfinite(vertices).all(axis=1)
+    usable[usable] = cKDTree(joints).query(vertices[usable])[0] <= 2 * margin
+    number = np.arange(n * n).reshape(n, n)
+    a, b, c, d = (
+        k.ravel() for k in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:])
+    )
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    faces = faces[usable[faces].all(axis=1)]
+    used = np.unique(faces)
+    return vertices[used], np.searchsorted(used, faces)
+
+
+@register("grid")
+def read_grid(data: Mapping[str, Any], source: str) -> Grid:
+    """The grid of a design file's content (see grid.schema.json). Raises InputError."""
+    try:
+        surface = _surface(data["surface"], source)
+        return Grid(
+            data["name"],
+            surface,
+            network_on(surface, data["network"]),
+            section_from_dict(data["section"]),
+            material_from_dict(data["material"]),
+            elements_per_piece=data.get("elements_per_piece", 2),
+            held=data.get("held"),
+        )
+    except InputError as error:
+        raise error.at(source) from None
+
+
+def _surface(data: Mapping[str, Any], source: str) -> Surface:
+    options = {key: value for key, value in data.items() if key != "type"}
+    if data["type"] == "analytic":
+        return AnalyticSurface(options.pop("name"), options)
+    if data["type"] == "mesh":
+        from ...geometry.mesh_surface import load_mesh_surface
+
+        return load_mesh_surface(
+            Path(source).parent / options["file"],
+            options.get("chart", "plane"),
+            options.get("up", "z"),
+        )
+    raise InputError(
+        "unknown kind of surface (known: analytic, mesh)", field="surface.type", value=data["type"]
+    )

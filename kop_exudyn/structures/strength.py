@@ -1,0 +1,176 @@
+"""Stress in every rod element, and how much of the material's elastic limit it uses.
+
+Normal stress at a section's corner (y, z), with N, M_y, M_z in the rod's local axes:
+
+    sigma = N / A + M_y z / I_y - M_z y / I_z
+
+The element's generalised stresses are those of its middle; statics carry its moments to its ends,
+which are where they are largest: M_y +- Q_z L / 2 and M_z -+ Q_y L / 2 (exact for straight elements
+without loads in between). Torsion gives the shear stress |M_t| W / J with W the section's
+`torsion_modulus`, transverse forces 3/2 |Q| / A (Timoshenko and Goodier, Theory of Elasticity, for
+rectangles; 4/3 would do for circles). Equivalent stress after von Mises, sqrt(sigma^2 + 3 tau^2),
+of the worse of two points: a corner with torsion's largest shear, or the section's middle with that
+and the transverse shear. Torsion is largest at the middle of a side, so the sum is on the safe
+side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from ..equilibrium.newton import Equilibrium
+from ..rods.sections import Material, Section
+from ..scene.scene import Scene
+from .base import Design
+
+_TRANSVERSE = 1.5  # largest over mean shear stress of a transverse force
+_SAME_STIFFNESS = 1e-9  # relative
+
+
+@dataclass(frozen=True)
+class Strength:
+    """Stresses (E,) of a scene's rod elements, force / length^2; NaN where an element has no
+    section.
+
+    axial : N / A
+    normal : largest |sigma| at a corner, at either end
+    shear : largest of torsion and transverse forces
+    equivalent : von Mises
+    limit : elastic limit of each element's material, NaN where unknown
+    """
+
+    axial: np.ndarray
+    normal: np.ndarray
+    shear: np.ndarray
+    equivalent: np.ndarray
+    limit: np.ndarray
+
+    @property
+    def utilisation(self) -> np.ndarray:
+        """(E,) equivalent stress over elastic limit; above 1 the rod yields or breaks."""
+        return self.equivalent / self.limit
+
+    @property
+    def largest(self) -> float | None:
+        """The largest utilisation; None where no element's is known."""
+        known = self.utilisation[np.isfinite(self.utilisation)]
+        return float(known.max()) if len(known) else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The largest equivalent stress and utilisation, and the element where that is; None where
+        unknown."""
+        if not np.isfinite(self.equivalent).any():
+            return {"equivalent_stress": None, "utilisation": None, "element": None}
+        worst = int(np.nanargmax(self.equivalent if self.largest is None else self.utilisation))
+        return {
+            "equivalent_stress": float(np.nanmax(self.equivalent)),
+            "utilisation": self.largest,
+            "element": worst,
+        }
+
+
+def rod_strength(
+    scene: Scene, equilibrium: Equilibrium, materials: Sequence[Material] = ()
+) -> Strength:
+    """Stresses of all elements of a scene in an equilibrium.
+
+    materials : those that the scene's rods may be made of; an element's own is the one that
+        explains its stiffness
+    """
+    n = len(scene.elements)
+    lengths = scene.rest_lengths(equilibrium.q)
+    axial, normal, shear, equivalent = np.full((4, n), np.nan)
+    for section, elements in _by_section(scene):
+        rows = _section_stress(section, equilibrium.stress[elements], lengths[elements])
+        axial[elements], normal[elements], shear[elements], equivalent[elements] = rows
+    limit = material_values(scene, materials, "elastic_limit", np.fmin)
+    return Strength(axial, normal, shear, equivalent, limit)
+
+
+def design_strength(design: Design, equilibria: Mapping[str, Equilibrium]) -> dict[str, Strength]:
+    """Stresses by role of a design's equilibria, with the materials that the design carries."""
+    materials = materials_of(design)
+    return {
+        role: rod_strength(design.scene(role), equilibrium, materials)
+        for role, equilibrium in equilibria.items()
+    }
+
+
+def strength_summary(
+    design: Design, equilibria: Mapping[str, Equilibrium]
+) -> dict[str, dict[str, Any]]:
+    """`Strength.to_dict()` by role, as results have it."""
+    return {
+        role: strength.to_dict() for role, strength in design_strength(design, equilibria).items()
+    }
+
+
+def materials_of(design: Design) -> tuple[Material, ...]:
+    """Materials among a design's attributes, and among the fields of the dataclasses there, in a
+    fixed order."""
+    return tuple(dict.fromkeys(_materials_in(vars(design).values(), depth=1)))
+
+
+def material_values(
+    scene: Scene, materials: Sequence[Material], name: str, choose: Callable = np.fmax
+) -> np.ndarray:
+    """(E,) a property of every rod element's material, the one that explains its stiffness; NaN
+    where unknown.
+
+    choose : which value, where several materials do
+    """
+    values = np.full(len(scene.elements), np.nan)
+    for section, elements in _by_section(scene):
+        for material in materials:
+            value = getattr(material, name)
+            if value is not None:
+                same = elements[
+                    np.isclose(
+                        scene.stiffness[elements],
+                        section.stiffness(material),
+                        rtol=_SAME_STIFFNESS,
+                        atol=0,
+                    ).all(axis=1)
+                ]
+                values[same] = choose(values[same], value)
+    return values
+
+
+def _materials_in(values: Any, depth: int) -> Iterator[Material]:
+    for value in values:
+        if isinstance(value, Material):
+            yield value
+        elif depth and is_dataclass(value) and not isinstance(value, type):
+            yield from _materials_in(vars(value).values(), depth - 1)
+
+
+def _by_section(scene: Scene) -> Iterator[tuple[Section, np.ndarray]]:
+    """Each section of the scene with its elements."""
+    elements: dict[int, tuple[Section, list[np.ndarray]]] = {}
+    for chain in scene.chains:
+        if chain.section is not None:
+            elements.setdefault(id(chain.section), (chain.section, []))[1].append(chain.elements)
+    for section, parts in elements.values():
+        yield section, np.concatenate(parts)
+
+
+def _section_stress(
+    section: Section, stress: np.ndarray, lengths: np.ndarray
+) -> tuple[np.ndarray, ...]:
+    """axial, normal, shear, equivalent (n,) for generalised stresses (n, 6)."""
+    N, Qy, Qz, Mt, My, Mz = stress.T
+    axial = N / section.area
+    y, z = section.outline.T
+    ends = np.array([[-0.5], [0.5]]) * lengths  # (2, n), from the middle
+    bending = np.multiply.outer(My + ends * Qz, z / section.inertia_y) - np.multiply.outer(
+        Mz - ends * Qy, y / section.inertia_z
+    )
+    normal = np.abs(axial[:, None] + bending).max(axis=(0, 2))
+    torsion = np.abs(Mt) * section.torsion_modulus / section.torsion
+    shear = torsion + _TRANSVERSE * np.hypot(Qy, Qz) / section.area
+    corner, middle = np.hypot(normal, np.sqrt(3) * torsion), np.hypot(axial, np.sqrt(3) * shear)
+    return axial, normal, shear, np.maximum(corner, middle)

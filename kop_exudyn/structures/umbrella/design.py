@@ -1,0 +1,356 @@
+"""Umbrella meshes: cells of two plates and crossing arms, deployed from a flat stack by pulling the
+plates together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import InputError, SimulationFailure
+from ...kit.groups import ElementGroup
+from ...rods.sections import Material, material_from_dict
+from ..base import Design, Role, Target, register
+from .bodies import RODS, joint_bodies
+from .layout import BaseMesh, Plates, umbrella_mesh
+from .mesh import UmbrellaMesh, UmbrellaTarget
+from .pins import Pins, pins_from_dict
+from .release import release_mesh
+
+if TYPE_CHECKING:
+    from ...equilibrium.newton import Equilibrium
+    from ...scene.attraction import Attraction
+    from ...scene.scene import Scene
+    from ...scene.state import State
+
+# Shortest arms of the published designs, as a multiple of the plate edge.
+_LEAST_LENGTH = 32 / 30
+_MIN_ELEMENTS, _MAX_ELEMENTS = 1, 20
+
+
+@dataclass(frozen=True)
+class Deployment:
+    """How an umbrella mesh is opened.
+
+    weights : of the actuators, one solve after the other
+    attraction : weight that pulls X joints and cell midpoints to their places meanwhile; 0 in the
+        final state
+    share : of the attraction, omega; the rest, 1e-5 of it, would pull towards the surface and is
+        left out
+    angle : rad, turn of all hinges in the compact state, so that it isn't the unstable equilibrium
+    tolerance : relative residual of all solves but the last
+    """
+
+    weights: tuple[float, ...] = (1e-3, 1e-2, 1e-1, 1.0)
+    attraction: float = 0.1
+    share: float = 0.99999
+    angle: float = 1e-3
+    tolerance: float = 1e-5
+
+
+class Umbrella(Design):
+    """An umbrella mesh. Its parameters are the arm lengths: top and bottom of every cell, one cell
+    after the other.
+
+    Where joints are pinned, their positions follow as further parameters, which belong to no
+    element.
+
+    Parameters
+    ----------
+    name : the design's name
+    mesh : geometry in the compact state
+    arms, plates : materials
+    arm_elements, plate_elements : rod elements in an arm and in a plate rod
+    plate_model : "rods", or "rigid": plates as bodies that don't bend, with fewer unknowns
+    least_length : lower bound of arm lengths, default 32/30 of the plate edge
+    pins : supports in the final state; without them the central X joint is held
+    deployment : how it is opened
+    """
+
+    class_name = "umbrella"
+    roles = (Role("deployed", fitted=True),)
+
+    def __init__(
+        self,
+        name: str,
+        mesh: UmbrellaMesh,
+        *,
+        arms: Material = Material(1400.0, 0.35),
+        plates: Material = Material(14000.0, 0.35),
+        arm_elements: int = 3,
+        plate_elements: int = 1,
+        plate_model: str = RODS,
+        least_length: float | None = None,
+        pins: Pins | None = None,
+        deployment: Deployment = Deployment(),
+    ):
+        self.name, self.mesh, self.pins, self.deployment = name, mesh, pins, deployment
+        self.arms, self.plates = arms, plates
+        self.arm_elements, self.plate_elements, self.plate_model = (
+            arm_elements,
+            plate_elements,
+            plate_model,
+        )
+        self._bodies = joint_bodies(mesh, plate_model)
+        lengths = mesh.lengths.ravel()
+        self.least_length = (
+            _LEAST_LENGTH * mesh.plate_edge if least_length is None else least_length
+        )
+        self.parameters, self.free_scale = lengths, float(np.median(lengths))
+        self.lower, self.upper = (
+            np.minimum(self.least_length, lengths),
+            np.full(len(lengths), np.inf),
+        )
+        if pins is not None:
+            places = pins.positions.ravel()
+            self.parameters = np.concatenate([lengths, places])
+            self.lower = np.concatenate([self.lower, places - pins.reach])
+            self.upper = np.concatenate([self.upper, places + pins.reach])
+        self.groups = [ElementGroup("cell", np.arange(lengths.size).reshape(-1, 2))]
+        self.joints = self._bodies.body[mesh.crossings]
+
+    @classmethod
+    def from_release(
+        cls, data: Mapping[str, Any], source: str = "umbrella mesh", **options: Any
+    ) -> Umbrella:
+        """The design of a released file's content; options as for the class. Raises InputError."""
+        return cls(options.pop("name", _stem(source)), release_mesh(data, source), **options)
+
+    @cached_property
+    def _model(self):
+        from .scene import UmbrellaModel, umbrella_scene
+
+        return umbrella_scene(
+            self.mesh,
+            UmbrellaModel(
+                self.arm_elements, self.plate_elements, self.arms, self.plates, self.plate_model
+            ),
+            len(self.parameters),
+        )
+
+    def scene(self, role: str = "deployed") -> Scene:
+        """The final state's scene: actuators of weight 1, no attraction, pins or the central X
+        joint held."""
+        return self._held if self.pins is None else self._pinned
+
+    @cached_property
+    def _pinned(self) -> Scene:
+        """With the design's pins."""
+        assert self.pins is not None
+        return self.pins.scene(
+            self._model.scene, self.joints[self.pins.joints], self.mesh.lengths.size
+        )
+
+    @cached_property
+    def _held(self) -> Scene:
+        """With the central X joint held."""
+        scene = self._model.scene
+        pinned = np.zeros(scene.n_dofs, bool)
+        centre = self.joints[self.mesh.central_crossing]
+        pinned[6 * centre : 6 * centre + 6] = True
+        return scene.with_pins(pinned)
+
+    def deploy(self, q: np.ndarray | None = None) -> dict[str, Equilibrium]:
+        """Open the mesh from its compact state.
+
+        The actuators' weight grows in steps under the attraction; then the attraction is taken away
+        and the central X joint held where it is, or the mesh laid on its pins. Raises
+        SimulationFailure.
+        """
+        from ...equilibrium.newton import NewtonOptions, solve
+        from ...equilibrium.system import System
+
+        q = self.parameters if q is None else np.asarray(q, float)
+        scene, attraction = (
+            self._model.scene if self.mesh.target else self._held,
+            self.attractions(),
+        )
+        options, done = NewtonOptions(tolerance=self.deployment.tolerance), []
+        start = self._model.compact(q, self.deployment.angle)
+        for weight in self.deployment.weights:
+            actuators = self._model.actuators.weighted(weight * self._model.energy_scale)
+            system = System(scene.with_terms(actuators, *attraction))
+            start = self._solved(solve, system, q, start, options, f"actuator weight {weight:g}")
+            done.append(start)
+        if self.pins is not None:
+            places = q[self.mesh.lengths.size :].reshape(-1, 3)
+            start = self.pins.aligned(start.state, self.joints[self.pins.joints], places)
+        final = self._solved(
+            solve, self.systems["deployed"], q, start, NewtonOptions(), "final state"
+        )
+        return {"deployed": final.after(*done)}
+
+    def _solved(self, solve, system, q, start, options, where: str) -> Equilibrium:
+        try:
+            return solve(system, q, start, options=options)
+        except SimulationFailure as failure:
+            raise failure.within(f"{self.name}: {where}") from None
+
+    def attractions(self) -> tuple[Attraction, ...]:
+        """The attraction during deployment: X joints and cell midpoints to their places, as far as
+        these are known.
+
+        Energy: weight share / (2 l0^2 3 n) sum |x - x*|^2 over n points, l0 the compact mesh's
+        bounding-box diagonal.
+        """
+        from ...scene.attraction import Attraction
+
+        target = self.mesh.target
+        if target is None or not self.deployment.attraction:
+            return ()
+        known = np.isfinite(target.crossings).all(axis=1)
+        n = np.count_nonzero(known) + self.mesh.n_cells
+        weight = self.deployment.attraction * self.deployment.share / (3 * n)
+        weight *= self._model.energy_scale / self.mesh.size**2
+        return (
+            Attraction(self.joints[known], targets=target.crossings[known], target_weight=weight),
+            Attraction(
+                self._bodies.body[self.mesh.centres], targets=target.plates, target_weight=weight
+            ),
+        )
+
+    @cached_property
+    def deployed(self) -> Equilibrium:
+        """The input design's final state."""
+        return self.deploy()["deployed"]
+
+    @cached_property
+    def target(self) -> Target:
+        """The mesh's target surface, or, where it has none, the one through its deployed X joints
+        and midpoints."""
+        state = self.deployed.state
+        positions = state.positions[self.joints]
+        if self.mesh.target is not None:
+            vertices, faces = self.mesh.target.vertices, self.mesh.target.faces
+        else:
+            vertices, faces = self._own_surface(state)
+        used = vertices[np.unique(faces)]
+        return Target(vertices, faces, positions, float(np.linalg.norm(np.ptp(used, axis=0))))
+
+    def _own_surface(self, state: State) -> tuple[np.ndarray, np.ndarray]:
+        """Triangles between each cell's midpoint and its X joints, in pairs."""
+        mesh = self.mesh
+        place = np.full(len(mesh.positions), -1)
+        place[mesh.crossings] = np.arange(len(mesh.crossings))
+        arms = mesh.rods.arms
+        at = place[mesh.rods.joints[arms]].max(axis=1)
+        touching = np.unique(np.stack([mesh.rods.cells[arms], at], axis=1), axis=0)
+        faces = [
+            (len(self.joints) + a[0], a[1], b[1])
+            for k, a in enumerate(touching)
+            for b in touching[k + 1 :]
+            if a[0] == b[0]
+        ]
+        middles = state.positions[self._bodies.body[mesh.centres]].mean(axis=1)
+        return np.concatenate([state.positions[self.joints], middles]), np.array(faces, int)
+
+    def report_positions(self, state: State) -> np.ndarray:
+        """Positions of all joints, plates' included, in the order and the units of the design's own
+        file."""
+        return self._bodies.positions(state)
+
+    def spacings(self, state: State) -> np.ndarray:
+        """Distance (n_cells,) of the two plates of every cell."""
+        return self._model.actuators.spacings(state)
+
+    def with_lengths(self, lengths: np.ndarray) -> Umbrella:
+        """The same design with other arm lengths (n_cells, 2) as its input."""
+        lengths = np.array(lengths, float).reshape(-1, 2)
+        positions = self.mesh.compact_positions(lengths.ravel())
+        return self._like(replace(self.mesh, lengths=lengths, positions=positions))
+
+    def with_plates(self, plate_model: str, young: float | None = None) -> Umbrella:
+        """The same design with its plates modelled as "rods", perhaps of another modulus, or
+        "rigid"."""
+        plates = self.plates if young is None else replace(self.plates, young=young)
+        return self._like(self.mesh, plate_model=plate_model, plates=plates)
+
+    def _like(self, mesh: UmbrellaMesh, **changes: Any) -> Umbrella:
+        options: dict[str, Any] = {
+            "arms": self.arms,
+            "plates": self.plates,
+            "arm_elements": self.arm_elements,
+            "plate_elements": self.plate_elements,
+            "plate_model": self.plate_model,
+            "least_length": self.least_length,
+            "pins": self.pins,
+            "deployment": self.deployment,
+        }
+        design = Umbrella(self.name, mesh, **(options | changes))
+        design.loads = self.loads
+        return design
+
+
+@register("umbrella")
+def umbrella_from_dict(data: Mapping[str, Any], source: str = "design") -> Umbrella:
+    """The design of a file of class "umbrella" (see umbrella.schema.json); raises InputError naming
+    the field."""
+    try:
+        base = BaseMesh(
+            data["base"]["vertices"],
+            data["base"]["faces"],
+            bool(data["base"].get("flipped", False)),
+        )
+        plates = Plates(**data.get("plates", {}))
+        materials: dict[str, Any] = {
+            key: material_from_dict(value) for key, value in data.get("materials", {}).items()
+        }
+        target = _target(data["target"], base) if "target" in data else None
+        pins = pins_from_dict(data["pins"], base, target) if "pins" in data else None
+        return Umbrella(
+            data["name"],
+            umbrella_mesh(base, data["lengths"], plates, target),
+            **materials,
+            pins=pins,
+            arm_elements=_count(data, "arm_elements", 3),
+            plate_elements=_count(data, "plate_elements", 1),
+            plate_model=data.get("plate_model", RODS),
+            least_length=data.get("least_length"),
+        )
+    except KeyError as error:
+        raise InputError("a field is missing", source=source, field=str(error).strip("'")) from None
+    except (TypeError, AttributeError) as error:
+        raise InputError(f"wrong fields: {error}", source=source) from None
+    except InputError as error:
+        raise error.at(source) from None
+
+
+def _target(data: Mapping[str, Any], base: BaseMesh) -> UmbrellaTarget:
+    """The target of a design file; sizes are checked against the base mesh."""
+    n_cells, n_edges = len(base.faces), len(base.cells)
+    vertices, faces = np.array(data["vertices"], float), np.array(data["faces"], int)
+    crossings, plates = np.array(data["crossings"], float), np.array(data["plates"], float)
+    for field, array, shape in (
+        ("vertices", vertices, (len(vertices), 3)),
+        ("faces", faces, (len(faces), 3)),
+        ("crossings", crossings, (n_edges, 3)),
+        ("plates", plates, (n_cells, 3)),
+    ):
+        if array.shape != shape or not np.isfinite(array).all():
+            raise InputError(f"expected finite numbers of shape {shape}", field=f"target.{field}")
+    if faces.min(initial=0) < 0 or faces.max(initial=-1) >= len(vertices):
+        raise InputError(
+            f"names a vertex that doesn't exist (there are {len(vertices)})", field="target.faces"
+        )
+    return UmbrellaTarget(vertices, faces, crossings, plates)
+
+
+def _count(data: Mapping[str, Any], field: str, default: int) -> int:
+    value = data.get(field, default)
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int)
+        or not _MIN_ELEMENTS <= value <= _MAX_ELEMENTS
+    ):
+        raise InputError(
+            f"expected an integer from {_MIN_ELEMENTS} to {_MAX_ELEMENTS}", field=field, value=value
+        )
+    return value
+
+
+def _stem(source: str) -> str:
+    name = str(source).replace("\\", "/").rsplit("/", 1)[-1]
+    return name.removesuffix(".gz").removesuffix(".json")

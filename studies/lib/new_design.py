@@ -1,0 +1,81 @@
+"""A design that a kit was not made for, built of that kit: relaxed towards its parts with one
+weight w_c."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from kop_exudyn.kit.parts import Assignment, Kit
+from kop_exudyn.search.assigned import in_rounds
+from kop_exudyn.search.dataset import Dataset
+from kop_exudyn.search.objective import Evaluation, Weights
+from kop_exudyn.search.pool import DesignPool
+from kop_exudyn.search.result import summary_of
+from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.stage_results import StageResult
+from kop_exudyn.search.stages import Stages
+from kop_exudyn.structures.base import Design
+
+
+def project_design(
+    design: Design, kit: Kit, factor: float, stages: StageSettings = StageSettings()
+) -> dict[str, Any]:
+    """The design projected onto a kit whose parts stay as they are, as plain data.
+
+    factor : w_c over the weight of the fit; all other settings from `stages`, without rescues
+
+    Returns for the states "direct" (every input element its nearest part), "relaxed" (elements
+    free, drawn to the parts by w_c), "built" (each relaxed element its nearest part) and
+    "reassigned" (parts exchanged where the objective gains) the `summary_of`, J, `changed` (places
+    in q of the elements whose part or variant isn't that of the direct state), and `positions` of
+    the bodies (n, 3) at the best placement; of the relaxed state also its `tightness` (root mean
+    square distance of elements to their parts by kind, relative to the kind's scale).
+
+    Raises SimulationFailure when the input design can't be simulated.
+    """
+    with DesignPool([design]) as pool:
+        pool.prepare()
+        dataset = Dataset.of_pool(pool, Weights.suiting([design]))
+        search = Stages(
+            dataset, kit.sizes, replace(stages, schedule=(factor * design.fit_weight,), rescues=0)
+        )
+        direct = search.direct(kit)
+        relaxed, built = search.to_parts(search.relaxed(kit, fixed_kit=True), fixed_kit=True)
+        states = {
+            "direct": direct,
+            "relaxed": search.confirmed(relaxed),
+            "built": built,
+            "reassigned": in_rounds(search, built, fixed_kit=True),
+        }
+        found = {name: _plain(dataset, state, direct.assignment) for name, state in states.items()}
+        found["relaxed"]["tightness"] = search.projection.tightness(
+            relaxed.evaluations[0].q, kit, relaxed.assignment
+        )
+        return {"weight": factor * design.fit_weight, "elements": design.n_elements, **found}
+
+
+def changed_parameters(before: Assignment, after: Assignment) -> np.ndarray:
+    """(k,) places in q of the elements that have another part or another variant."""
+    rows = [
+        group.indices[(a != b) | (v != w)].ravel()
+        for group, a, b, v, w in zip(
+            before.groups, before.part, after.part, before.variant, after.variant
+        )
+    ]
+    return np.sort(np.concatenate(rows)) if rows else np.empty(0, dtype=int)
+
+
+def _plain(dataset: Dataset, state: StageResult, direct: Assignment) -> dict[str, Any]:
+    design, outcome = dataset.designs[0], state.designs[0]
+    found = summary_of(outcome, design, dataset.references[0]) | {
+        "objective": state.value,
+        "changes": direct.changes(state.assignment),
+        "changed": changed_parameters(direct, state.assignment),
+    }
+    if isinstance(outcome, Evaluation):
+        positions = outcome.equilibria[design.fitted_role.name].state.positions
+        found["positions"] = outcome.fit.placement.apply(positions)
+    return found

@@ -1,0 +1,249 @@
+"""A design as a building: scaled up, on the ground, its rods coloured by their parts, with a person
+beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib import rcParams
+from matplotlib.figure import Figure
+from scipy.spatial import ConvexHull, cKDTree
+
+from kop_exudyn.drawing.colours import kit_colours
+from kop_exudyn.drawing.style import style
+from kop_exudyn.errors import SimulationFailure
+from kop_exudyn.exchange.meshes import sweep, tube
+from kop_exudyn.fabrication.pieces import parts_list_of
+from kop_exudyn.fabrication.placement import PlacedPieces
+from kop_exudyn.search.result import KitResult
+
+from .render import Body, Camera, Light, render
+
+_PAPER, _INK, _JOINT = (0.965, 0.962, 0.955), (0.22, 0.23, 0.26), (0.30, 0.31, 0.33)
+_WOOD = (0.78, 0.68, 0.55)  # rods that belong to no part
+_SLENDERNESS = 250  # size over breadth of rods that have no section of their own
+# of the camera: from top to bottom of the picture, above the ground
+_ANGLE, _RISE = np.radians(26), np.radians(19)
+
+
+@dataclass(frozen=True)
+class Pavilion:
+    """A design's final state in metres, standing on z = 0.
+
+    bodies : to render; footprint : (2,) extent in plan, height : all in m
+    scale : times the model; elements, parts : of the design, and how many different parts make it
+    max_percent : the largest deviation of a joint, % of the target's bounding box
+    """
+
+    name: str
+    bodies: list[Body]
+    footprint: np.ndarray
+    height: float
+    scale: float
+    elements: int
+    parts: int
+    max_percent: float
+
+
+def pavilion(result: KitResult, number: int, span: float, clearance: float = 0.0) -> Pavilion:
+    """One assigned design of a kit, scaled so that its larger side in plan is `span` (m).
+
+    clearance : height of the lowest rod over the ground (m), on four masts that only the picture
+        has
+
+    Scaled with its sections, a structure without weight keeps its shape. Raises SimulationFailure
+    when the stage has no such design.
+    """
+    design, outcome = result.designs[number], result.stages["assigned"].designs[number]
+    if isinstance(outcome, SimulationFailure):
+        raise outcome
+    role = design.fitted_role.name
+    state, scene = outcome.equilibria[role].state, design.scene(role)
+    half = 0.5 * scene.size / _SLENDERNESS
+    plain = np.array([[half, half], [-half, half], [-half, -half], [half, -half]])
+    mesh = sweep(scene, state, outline=plain, refinement=3)
+    pieces = parts_list_of(result).designs[number]
+    chains = PlacedPieces.of(pieces, role).chain_pieces
+    colours = _chain_colours(result, chains)
+    turn = _upright(outcome.fit.placement.apply(mesh.vertices))
+    rods = outcome.fit.placement.apply(mesh.vertices) @ turn.T
+    joints = outcome.fit.placement.apply(state.positions[design.joints]) @ turn.T
+    scale = span / np.ptp(rods[:, :2], axis=0).max()
+    low, high = rods.min(axis=0), rods.max(axis=0)
+    base = np.array([*(0.5 * (low + high)[:2]), low[2] - clearance / scale])
+    rods, joints = scale * (rods - base), scale * (joints - base)
+    breadth = scale * _breadth(scene, plain)
+    # joints of umbrella meshes are the centres of their cells
+    away, nearest = cKDTree(rods).query(joints)
+    bodies = [Body(rods, mesh.faces, colours[mesh.chains[mesh.faces[:, 0]]])]
+    bodies += [_balls(joints[away < breadth], 0.62 * breadth)] if (away < breadth).any() else []
+    bodies += _masts(rods[nearest]) if clearance else []
+    return Pavilion(
+        design.name,
+        bodies,
+        np.ptp(rods[:, :2], axis=0),
+        float(rods[:, 2].max()),
+        float(scale),
+        design.n_elements,
+        len({(piece.kind, piece.part) for piece in pieces.pieces}),
+        outcome.fit.max_percent,
+    )
+
+
+def picture(
+    building: Pavilion,
+    width: int = 1600,
+    height: int = 900,
+    samples: int = 2,
+    light: Light = Light(),
+    azimuth: float = -1.0,
+) -> np.ndarray:
+    """(height, width, 3) the pavilion seen from `azimuth` (rad) by someone who stands back on a
+    rise, sRGB."""
+    reach = 0.5 * float(np.linalg.norm(building.footprint))
+    towards, beside = (
+        np.array([np.cos(azimuth), np.sin(azimuth)]),
+        np.array([-np.sin(azimuth), np.cos(azimuth)]),
+    )
+    person = _person(np.array([*(0.62 * reach * towards + 0.52 * reach * beside), 0.0]), azimuth)
+    target = np.array([0.0, 0.0, 0.42 * building.height])
+    direction = np.array([*(np.cos(_RISE) * towards), np.sin(_RISE)])
+    half = np.tan(0.5 * _ANGLE)
+    distance = (
+        max(0.90 * reach / (half * width / height), 0.62 * building.height / half) + 0.7 * reach
+    )
+    return render(
+        [*building.bodies, person, _ground(9 * reach)],
+        Camera(target + distance * direction, target, _ANGLE),
+        width,
+        height,
+        samples=samples,
+        light=light,
+    )
+
+
+def framed(image: np.ndarray) -> Figure:
+    """The picture as a figure without frame, saved pixel by pixel."""
+    with style():
+        figure = Figure(
+            figsize=(
+                image.shape[1] / rcParams["savefig.dpi"],
+                image.shape[0] / rcParams["savefig.dpi"],
+            )
+        )
+        ax = figure.add_axes((0, 0, 1, 1))
+        ax.imshow(image, interpolation="none")
+        ax.set_axis_off()
+    return figure
+
+
+def _chain_colours(result: KitResult, chains: list) -> np.ndarray:
+    """(n_chains, 3) the colour of every rod's part, as in the project's other pictures."""
+    tables = kit_colours(result.kit.sizes)
+    return np.array(
+        [_WOOD if piece is None else tables[piece.kind][piece.part] for piece in chains]
+    )
+
+
+def _breadth(scene, plain: np.ndarray) -> float:
+    outline = next(
+        (chain.section.outline for chain in scene.chains if chain.section is not None), plain
+    )
+    return float(np.ptp(outline, axis=0).max())
+
+
+def _upright(points: np.ndarray) -> np.ndarray:
+    """Rotation that lays the points' flattest direction along z, bulging upwards."""
+    centred = points - points.mean(axis=0)
+    axes = np.linalg.svd(centred[:: max(1, len(points) // 20000)], full_matrices=False)[2]
+    normal = axes[2]
+    heights = centred @ normal
+    # the rim is farther from the mean than the crown, and has to be below
+    if abs(heights.min()) < heights.max():
+        normal = -normal
+    return np.stack([axes[0], np.cross(normal, axes[0]), normal])
+
+
+def _ground(half: float) -> Body:
+    """A square floor in many triangles, so that those behind the camera can be left out."""
+    x = np.linspace(-half, half, 61)
+    vertices = np.stack([*np.meshgrid(x, x), np.zeros((61, 61))], axis=-1).reshape(-1, 3)
+    corner = (61 * np.arange(60)[:, None] + np.arange(60)).ravel()
+    faces = np.concatenate(
+        [
+            np.stack([corner, corner + 1, corner + 62], axis=1),
+            np.stack([corner, corner + 62, corner + 61], axis=1),
+        ]
+    )
+    return Body.of(vertices, faces, _PAPER, ground=True)
+
+
+def _masts(joints: np.ndarray, radius: float = 0.045) -> list[Body]:
+    """Round masts under the four joints farthest out along the diagonals of the plan."""
+    plan = joints[:, :2] / np.ptp(joints[:, :2], axis=0)
+    feet = {int(np.argmax(plan @ diagonal)) for diagonal in ([1, 1], [1, -1], [-1, 1], [-1, -1])}
+    turn = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    ring = radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    found = []
+    for foot in sorted(feet):
+        rings = [
+            np.column_stack([ring + joints[foot, :2], np.full(12, z)])
+            for z in (0.0, joints[foot, 2])
+        ]
+        found.append(Body.of(np.concatenate(rings), tube(2, ring), _JOINT))
+    return found
+
+
+def _balls(centres: np.ndarray, diameter: float) -> Body:
+    """Small spheres at the joints, as one body."""
+    turn = (np.arange(42) + 0.5) / 42
+    longitude = np.pi * (1 + 5**0.5) * np.arange(42)
+    r = 2 * np.sqrt(turn * (1 - turn))
+    sphere = (
+        0.5
+        * diameter
+        * np.stack([r * np.cos(longitude), r * np.sin(longitude), 1 - 2 * turn], axis=1)
+    )
+    faces = ConvexHull(sphere).simplices
+    vertices = (centres[:, None] + sphere).reshape(-1, 3)
+    every = (faces[None] + len(sphere) * np.arange(len(centres))[:, None, None]).reshape(-1, 3)
+    return Body.of(vertices, every, _JOINT)
+
+
+def _person(place: np.ndarray, facing: float) -> Body:
+    """A standing person, 1.72 m, who looks along an azimuth (rad).
+
+    A stack of ellipses for legs, coat and head, as in an architect's model.
+    """
+    profile = np.array(
+        [  # height, half-width and half-depth, m
+            [0.00, 0.085, 0.12],
+            [0.05, 0.085, 0.10],
+            [0.45, 0.10, 0.085],
+            [0.80, 0.165, 0.11],
+            [1.00, 0.165, 0.115],
+            [1.22, 0.19, 0.12],
+            [1.38, 0.215, 0.115],
+            [1.43, 0.15, 0.085],
+            [1.46, 0.058, 0.06],
+            [1.50, 0.06, 0.065],
+            [1.54, 0.072, 0.085],
+            [1.61, 0.08, 0.098],
+            [1.68, 0.066, 0.08],
+            [1.72, 0.02, 0.03],
+        ]
+    )
+    turn = np.linspace(0, 2 * np.pi, 20, endpoint=False)
+    rings = np.stack(
+        [
+            profile[:, None, 1] * np.cos(turn),
+            profile[:, None, 2] * np.sin(turn),
+            np.broadcast_to(profile[:, None, 0], (len(profile), 20)),
+        ],
+        axis=2,
+    )
+    outline = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    c, s = np.cos(facing + 0.5 * np.pi), np.sin(facing + 0.5 * np.pi)  # shoulders across
+    turned = rings.reshape(-1, 3) @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])
+    return Body.of(turned + place, tube(len(profile), outline), _INK)

@@ -1,0 +1,115 @@
+"""Linear parts with slit ends: what slits of which length gain, for how many parts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from kop_exudyn.errors import SimulationFailure
+from kop_exudyn.kit.cluster import cluster
+from kop_exudyn.kit.elements import collect
+from kop_exudyn.kit.groups import ElementGroup
+from kop_exudyn.kit.parts import Assignment, Kit
+from kop_exudyn.search.dataset import Dataset
+from kop_exudyn.search.objective import Evaluation, Weights
+from kop_exudyn.search.pool import DesignPool
+from kop_exudyn.search.result import summary_of
+from kop_exudyn.structures.base import Design
+
+
+def slit_kit(
+    designs: Sequence[Design],
+    m: int,
+    penalty: float | None,
+    *,
+    restarts: int = 10,
+    seed: int = 0,
+    path_steps: int = 5,
+    jobs: int = 1,
+) -> dict[str, Any]:
+    """The best m slit parts for the designs' linear elements, and the designs built of them; other
+    elements stay.
+
+    penalty : cost of slits, in units of 1/2 (slit / scale)^2 averaged over the parts, against the
+        projection energy; None: plain linear parts
+    path_steps : of the straight path on which the designs are followed to their parts
+
+    Returns
+    projection_energy : mean of half the squared distances of the linear elements to what their
+        parts realise, over the square of the scale (without the cost of slits)
+    scale : median length of the linear elements; slits : (m,) lengths in % of it
+    rms_percent, largest_percent : distances of lengths to what the parts realise, in % of the scale
+    designs : by design, its name and `summary_of`, {"failed": why} where it can't be followed to
+        its parts
+
+    Raises InputError for impossible requests, SimulationFailure when an input design can't be
+    simulated.
+    """
+    kind = "linear" if penalty is None else "slit"
+    with DesignPool(designs, jobs) as pool:
+        pool.prepare()
+        dataset = Dataset.of_pool(pool, Weights.suiting(designs))
+        q = dataset.parameters
+        groups = [
+            ElementGroup(kind, group.indices) for group in dataset.groups if group.kind == "linear"
+        ]
+        scale = collect(groups, q)[kind].scale
+        penalties = None if penalty is None else {kind: (0.0, 0.0, penalty)}
+        found = cluster(groups, q, {kind: m}, restarts=restarts, seed=seed, penalties=penalties)
+        realised = found.assignment.realise(found.kit, q)
+        return {
+            "scale": scale,
+            "kit": found.kit.to_dict(),
+            **distances(q, realised, found.assignment, scale),
+            "slits": _slits(found.kit, kind) / scale * 100,
+            "designs": [
+                {"name": design.name, **figures}
+                for design, figures in zip(designs, _built(dataset, realised, path_steps))
+            ],
+        }
+
+
+def distances(
+    q: np.ndarray, realised: np.ndarray, assignment: Assignment, scale: float
+) -> dict[str, float]:
+    """Projection energy, root mean square and largest distance of elements q (n_q,) to realised
+    ones (n_q,)."""
+    squared = [np.sum((q - realised)[group.indices] ** 2, axis=1) for group in assignment.groups]
+    lengths = np.concatenate([(q - realised)[group.indices].ravel() for group in assignment.groups])
+    return {
+        "projection_energy": 0.5 * float(np.mean(np.concatenate(squared))) / scale**2,
+        "rms_percent": 100 * float(np.sqrt(np.mean(lengths**2))) / scale,
+        "largest_percent": 100 * float(np.abs(lengths).max()) / scale,
+    }
+
+
+def _slits(kit: Kit, kind: str) -> np.ndarray:
+    """(m,) slit lengths."""
+    return kit[kind][:, 2] if kind == "slit" else np.zeros(len(kit[kind]))
+
+
+def _built(dataset: Dataset, q: np.ndarray, path_steps: int) -> list[dict[str, Any]]:
+    """Every design followed to the elements q, confirmed by Exudyn."""
+    start = list(
+        dataset.judge(
+            {
+                n: (design.parameters, dict(reference.equilibria))
+                for n, (design, reference) in enumerate(zip(dataset.designs, dataset.references))
+            }
+        ).values()
+    )
+    paths = dataset.follow(q, start, path_steps)
+    ends: dict[int, Evaluation] = {
+        n: path[-1] for n, path in enumerate(paths) if not isinstance(path, SimulationFailure)
+    }
+    confirmed = dataset.confirm(ends)
+    outcomes = [
+        path if isinstance(path, SimulationFailure) else confirmed[n]
+        for n, path in enumerate(paths)
+    ]
+    return [
+        summary_of(outcome, design, reference)
+        for outcome, design, reference in zip(outcomes, dataset.designs, dataset.references)
+    ]

@@ -1,0 +1,89 @@
+"""The straight path from relaxed elements to their parts, with all that is seen on it: snaps,
+energies, deviations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kop_exudyn.errors import SimulationFailure
+from kop_exudyn.search.dataset import Dataset
+from kop_exudyn.search.objective import Evaluation, Weights
+from kop_exudyn.search.pool import DesignPool
+from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.stage_results import Jump, StageResult, find_jump
+from kop_exudyn.search.stages import Stages
+from kop_exudyn.structures.base import Design
+
+
+@dataclass(frozen=True)
+class WatchedPath:
+    """One design on its way.
+
+    start : relaxed; states : (steps,) after equal steps, the last one at the parts
+    moves_percent : (steps,) how far the joint that moves most goes in each step, % of the
+        bounding-box diagonal
+    energies : (steps + 1,) elastic, relative to the input design's, the start's first
+    deviations_percent : (steps + 1,) largest distance of a joint from the target, % of the diagonal
+    jump : the snap, or None
+    """
+
+    start: Evaluation
+    states: Sequence[Evaluation]
+    moves_percent: np.ndarray
+    energies: np.ndarray
+    deviations_percent: np.ndarray
+    jump: Jump | None
+
+
+def watch(
+    dataset: Dataset, relaxed: StageResult, steps: int
+) -> list[WatchedPath | SimulationFailure]:
+    """Follow every design of a relaxed result to its parts; one that fails on the way comes back as
+    its failure."""
+    q = relaxed.assignment.matrix(relaxed.kit) @ relaxed.kit.vector
+    q[dataset.free] = np.concatenate([e.q for e in relaxed.evaluations])[dataset.free]
+    paths = dataset.follow(q, relaxed.evaluations, steps)
+    return [
+        path if isinstance(path, SimulationFailure) else _watched(design, reference, start, path)
+        for design, reference, start, path in zip(
+            dataset.designs, dataset.references, relaxed.evaluations, paths
+        )
+    ]
+
+
+def watch_one(
+    design: Design,
+    parts: dict[str, int],
+    settings: StageSettings,
+) -> tuple[WatchedPath | SimulationFailure, StageResult]:
+    """One design relaxed with its own kit and followed to its parts, and the relaxed result.
+
+    Raises SimulationFailure when the input design can't be simulated.
+    """
+    with DesignPool([design]) as pool:
+        pool.prepare()
+        dataset = Dataset.of_pool(pool, Weights.suiting([design]))
+        stages = Stages(dataset, parts, settings)
+        relaxed = stages.relaxed(stages.direct().kit)
+        return watch(dataset, relaxed, settings.path_steps)[0], relaxed
+
+
+def _watched(
+    design: Design, reference, start: Evaluation, path: Sequence[Evaluation]
+) -> WatchedPath:
+    role, diagonal = design.fitted_role.name, reference.target.diagonal
+    every = [start, *path]
+    joints = np.stack([e.equilibria[role].state.positions[design.joints] for e in every])
+    moves = np.linalg.norm(np.diff(joints, axis=0), axis=2).max(axis=1)
+    energies = np.array([e.equilibria[role].elastic_energy for e in every]) / reference.energy
+    return WatchedPath(
+        start,
+        list(path),
+        100 * moves / diagonal,
+        energies,
+        np.array([e.fit.max_percent for e in every]),
+        find_jump(design, start, path, diagonal),
+    )

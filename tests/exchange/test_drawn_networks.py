@@ -1,0 +1,393 @@
+"""Networks from drawings: OBJ and DXF files, written by the test or by ezdxf."""
+
+import json
+import logging
+
+import ezdxf
+import numpy as np
+import pytest
+
+from kop_exudyn.cli import main
+from kop_exudyn.errors import InputError
+from kop_exudyn.exchange.curve_files import DrawnCurve, read_curves
+from kop_exudyn.exchange.drawn_networks import joined, network_curves, read_network
+from kop_exudyn.io.designs import load_design
+
+GRID = """# three lines across two
+v -0.2 0 5
+v 2.2 0 5
+v -0.2 1 5
+v 2.2 1 5
+v 0 -0.2 5
+v 0 1.2 5
+v 1 -0.2 5
+v 1.1 0.5 5
+v 1 1.2 5
+v 2 -0.2 5
+v 2 1.2 5
+l 1 2
+l 3 4
+l 5 6
+l 7/1 8/2 \\
+  9/3
+l -2 -1
+"""
+OPTIONS = ("--opening", "30deg", "--section", "0.02,0.01", "--material", "2.1e9,0.35")
+
+
+@pytest.fixture
+def obj(tmp_path):
+    path = tmp_path / "net.obj"
+    path.write_text(GRID)
+    return path
+
+
+@pytest.fixture
+def drawing():
+    """A DXF document and its model space."""
+    document = ezdxf.new("R2010")
+    return document, document.modelspace()
+
+
+def saved(document, path):
+    document.saveas(path)
+    return path
+
+
+def piece(*points) -> DrawnCurve:
+    return DrawnCurve(
+        np.array([[*point, 0.0] for point in points], float), False, f"from {points[0]}"
+    )
+
+
+class TestObj:
+    def test_polylines(self, obj):
+        curves = read_curves(obj)
+        assert [len(curve.points) for curve in curves] == [2, 2, 2, 3, 2]
+        np.testing.assert_array_equal(curves[3].points[1], [1.1, 0.5, 5])
+        np.testing.assert_array_equal(curves[4].points, [[2, -0.2, 5], [2, 1.2, 5]])
+        assert [curve.label for curve in curves] == [
+            "line 13",
+            "line 14",
+            "line 15",
+            "line 16",
+            "line 18",
+        ]
+
+    def test_a_polyline_that_comes_back_is_closed(self, tmp_path):
+        path = tmp_path / "loop.obj"
+        path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2 3 1\n")
+        (curve,) = read_curves(path)
+        assert curve.closed and len(curve.points) == 3
+
+    @pytest.mark.parametrize(
+        "text, message",
+        [
+            ("v 0 0 0\nf 1 1 1\n", "net.obj: contains no curves"),
+            ("v 0 0\n", "line 1 = '0 0': expected three coordinates"),
+            (
+                "v 0 0 1e99\n",
+                "line 1 = '0 0 1e99': expected three coordinates of a vertex, within 1e60",
+            ),
+            ("v 0 0 nan\n", "line 1 = '0 0 nan': expected three coordinates"),
+            ("v 0 0 0\nv 1 1 1\n\nl 1 3\n", r"line 4 = 3: no such vertex \(2 are given before\)"),
+            ("v 0 0 0\nv 1 1 1\nl 0 1\n", "line 3 = 0: no such vertex"),
+            ("v 0 0 0\nv 1 1 1\nl 1 x\n", "line 3 = 'x': expected numbers"),
+            ("v 0 0 0\nv 1 1 1\nl 1\n", "line 3 = 'l 1': a polyline needs at least two"),
+        ],
+    )
+    def test_mistakes(self, text, message, tmp_path):
+        path = tmp_path / "net.obj"
+        path.write_text(text)
+        with pytest.raises(InputError, match=message) as caught:
+            read_curves(path)
+        assert str(caught.value).startswith(str(path))
+
+    def test_layers_are_of_dxf_files(self, obj):
+        with pytest.raises(InputError, match="only DXF files have layers"):
+            read_curves(obj, ["0"])
+
+
+class TestDxf:
+    def test_every_kind_of_curve(self, drawing, tmp_path, caplog):
+        document, space = drawing
+        space.add_line((0, 0, 1), (2, 0, 1))
+        space.add_lwpolyline([(0, 1), (1, 2), (2, 1)], dxfattribs={"elevation": 1})
+        space.add_polyline3d([(0, 3, 1), (1, 3, 1), (2, 4, 1)])
+        space.add_spline([(0, 5, 1), (1, 6, 1), (2, 5, 1)])
+        space.add_circle((1, 8, 1), 0.5)
+        space.add_text("not a rod")
+        with caplog.at_level(logging.WARNING, "kop_exudyn"):
+            line, lw, poly, spline, circle = read_curves(saved(document, tmp_path / "net.dxf"))
+        assert "left out what is no curve: 1 TEXT" in caplog.text
+        np.testing.assert_allclose(line.points, [[0, 0, 1], [2, 0, 1]])
+        np.testing.assert_allclose(lw.points, [[0, 1, 1], [1, 2, 1], [2, 1, 1]])
+        np.testing.assert_allclose(poly.points, [[0, 3, 1], [1, 3, 1], [2, 4, 1]])
+        np.testing.assert_allclose(spline.points[[0, -1]], [[0, 5, 1], [2, 5, 1]], atol=1e-12)
+        assert len(spline.points) > 8 and np.abs(spline.points - [1, 6, 1]).sum(axis=1).min() < 0.05
+        assert circle.closed and len(circle.points) > 8
+        np.testing.assert_allclose(
+            np.linalg.norm(circle.points - [1, 8, 1], axis=1), 0.5, atol=1e-3
+        )
+        assert line.label.startswith("LINE ") and spline.label.startswith("SPLINE ")
+
+    def test_bulges_are_arcs(self, drawing, tmp_path):
+        document, space = drawing
+        space.add_lwpolyline([(0, 0, 0, 0, 1), (2, 0)])  # a half circle below
+        (curve,) = read_curves(saved(document, tmp_path / "net.dxf"))
+        np.testing.assert_allclose(np.linalg.norm(curve.points - [1, 0, 0], axis=1), 1, atol=1e-3)
+
+    def test_layers(self, drawing, tmp_path):
+        document, space = drawing
+        for name in ("rods", "frame"):
+            document.layers.add(name)
+            space.add_line((0, 0), (1, 0), dxfattribs={"layer": name})
+        path = saved(document, tmp_path / "net.dxf")
+        assert len(read_curves(path)) == 2 and len(read_curves(path, ["rods"])) == 1
+        with pytest.raises(
+            InputError, match=r"layer = 'rod': no such layer \(there are frame, rods\)"
+        ):
+            read_curves(path, ["rod"])
+
+    def test_entities_of_other_programs_are_left_out(self, drawing, tmp_path):
+        document, space = drawing
+        space.add_line((0, 0), (1, 0))
+        path = saved(document, tmp_path / "net.dxf")
+        content = path.read_bytes().replace(
+            b"ENTITIES\n", b"ENTITIES\n  0\nODD_THING\n  5\nFEFE\n", 1
+        )
+        path.write_bytes(content)
+        assert b"ODD_THING" in content and len(read_curves(path)) == 1
+
+    @pytest.mark.parametrize(
+        "content, message",
+        [
+            (b"", "can't be read as DXF|contains no curves"),
+            (b"\x00\x01\x02" * 50, "can't be read as DXF|contains no curves"),
+            (b"not a drawing at all\n", "can't be read as DXF|contains no curves"),
+        ],
+    )
+    def test_something_else(self, content, message, tmp_path):
+        path = tmp_path / "net.dxf"
+        path.write_bytes(content)
+        with pytest.raises(InputError, match=message) as caught:
+            read_curves(path)
+        assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
+
+
+class TestJoining:
+    def test_edges_become_curves(self):
+        """Every edge of a net drawn for itself, in any order and direction."""
+        xs, ys = [0.0, 1.0, 2.1], [0.0, 0.9, 2.0]
+        edges = [piece((a, y), (b, y)) for y in ys for a, b in zip(xs, xs[1:])]
+        edges += [piece((x, b), (x, a)) for x in xs for a, b in zip(ys, ys[1:])]
+        edges = [edges[k] for k in np.random.default_rng(3).permutation(len(edges))]
+        found = joined(edges, 1e-6)
+        assert len(found) == 6 and {len(curve.points) for curve in found} == {3}
+        assert all(np.ptp(curve.points, axis=0).min() == 0 for curve in found)
+        assert not any(curve.closed for curve in found)
+
+    def test_sharp_corners_stay_joints(self):
+        assert len(joined([piece((0, 0), (1, 0)), piece((1, 0), (1, 1))], 1e-6)) == 2
+
+    def test_a_ring_of_pieces_is_closed(self):
+        corners = [(np.cos(t), np.sin(t)) for t in np.linspace(0, 2 * np.pi, 13)[:-1]]
+        (ring,) = joined([piece(a, b) for a, b in zip(corners, corners[1:] + corners[:1])], 1e-6)
+        assert ring.closed and len(ring.points) == 12
+
+    def test_the_straightest_continuation(self):
+        fan = [piece((0, 0), (1, 0)), piece((1, 0), (2, 0.1)), piece((1, 0), (2, 0.6))]
+        assert sorted(len(curve.points) for curve in joined(fan, 1e-6)) == [2, 3]
+
+
+class TestNetworks:
+    def test_scale_plane_and_kind(self):
+        curves = [
+            DrawnCurve(np.array([[0, 7, 0], [1, 7, 1], [2, 7, 0]], float), False, "a"),
+            DrawnCurve(np.array([[0, 7, 0.5], [2, 7, 0.5]], float), False, "b"),
+        ]
+        entries, labels = network_curves(curves, "polyline", 1000.0)
+        assert entries[0] == {"type": "polyline", "points": [[0, 0], [1000, 1000], [2000, 0]]}
+        assert labels == ["a", "b"] and network_curves(curves)[0][0]["type"] == "spline"
+        assert network_curves(curves)[0][1]["type"] == "polyline"
+
+    def test_drawings_in_space_are_refused(self):
+        with pytest.raises(
+            InputError, match="must lie in a plane parallel to the axes; they extend by 1, 1, 1"
+        ):
+            network_curves([DrawnCurve(np.array([[0, 0, 0], [1, 1, 1.0]]), False, "a")])
+
+    def test_a_curve_without_joints_is_named_as_in_the_drawing(self, obj):
+        obj.write_text(GRID + "v 8 8 5\nv 9 9 5\nl -2 -1\n")
+        with pytest.raises(InputError, match=r"net.obj: line 21\.points: crosses no other curve"):
+            read_network(obj)
+
+    def test_points_twice_are_dropped(self):
+        doubled = DrawnCurve(np.array([[0, 0, 0], [0, 0, 0], [1, 0, 0]], float), False, "a")
+        assert network_curves([doubled, piece((0.5, -1), (0.5, 1))])[0][0]["points"] == [
+            [0, 0],
+            [1, 0],
+        ]
+
+
+class TestCommand:
+    def test_obj_to_design(self, obj, tmp_path, capsys):
+        out = tmp_path / "design.json"
+        assert (
+            main(
+                [
+                    "import",
+                    str(obj),
+                    "--out",
+                    str(out),
+                    *OPTIONS,
+                    "--elastic-limit",
+                    "4e7",
+                    "--free-ends",
+                ]
+            )
+            == 0
+        )
+        assert capsys.readouterr().out == f"{out}\n"
+        design = load_design(out)
+        assert design.name == "net" and design.network.n_joints == 6
+        assert design.opening == pytest.approx(np.pi / 6)
+        assert {strand.head for strand in design.network.strands} != {0.0}
+        assert json.loads(out.read_text())["material"]["elastic_limit"] == 4e7
+
+    def test_a_mesh_to_keep_to(self, obj, tmp_path, repository, capsys):
+        (tmp_path / "designs").mkdir()
+        mesh, out = tmp_path / "meshes" / "hill.obj", tmp_path / "designs" / "net.json"
+        options = ("import", str(obj), "--out", str(out), *OPTIONS, "--target", str(mesh))
+        assert main(list(options)) == 2
+        assert "target.file = " in capsys.readouterr().err and not out.exists()
+        mesh.parent.mkdir()
+        mesh.write_text("v -5 -5 0\nv 5 -5 0\nv 0 5 0\nv 0 0 1\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")
+        assert main(list(options)) == 0
+        assert json.loads(out.read_text())["target"] == {"file": "../meshes/hill.obj"}
+        design = load_design(out)
+        assert (
+            len(design.target.faces) == 3
+            and len(design.target.positions) == design.network.n_joints
+        )
+
+    def test_dxf_to_design_with_json(self, drawing, tmp_path, capsys):
+        document, space = drawing
+        for y in (0, 1000):
+            space.add_line((-200, y), (2200, y))
+        for x in (0, 1000, 2000):
+            space.add_spline([(x, -200), (x + 50, 500), (x, 1200)])
+        path, out = saved(document, tmp_path / "net.dxf"), tmp_path / "design.json"
+        assert (
+            main(["import", str(path), "--out", str(out), *OPTIONS, "--scale", "0.001", "--json"])
+            == 0
+        )
+        assert json.loads(capsys.readouterr().out) == {
+            "design": str(out),
+            "class": "c_shell",
+            "name": "net",
+        }
+        design = load_design(out)
+        assert design.network.n_joints == 6 and design.network.size < 3
+
+    @pytest.mark.parametrize(
+        "options, message",
+        [
+            ((), "a C-shell needs --opening"),
+            (OPTIONS[:2], "a C-shell needs --section"),
+            ((*OPTIONS, "--as", "umbrella"), "an umbrella mesh on a surface needs --patch"),
+            ((*OPTIONS, "--material", "1,0.7"), "material.poisson = 0.7: must be at most 0.5"),
+            ((*OPTIONS, "--opening", "9"), "opening.angle = 9.0"),
+            (
+                (*OPTIONS, "--opening", "wide"),
+                "expected an angle in radians, or as 35deg, got 'wide'",
+            ),
+            ((*OPTIONS, "--scale", "0"), "expected a positive number"),
+            ((*OPTIONS, "--section", "3"), "expected two numbers"),
+        ],
+    )
+    def test_mistakes(self, options, message, obj, tmp_path, capsys):
+        try:
+            status = main(["import", str(obj), "--out", str(tmp_path / "out.json"), *options])
+        except SystemExit as end:
+            status = end.code
+        error = capsys.readouterr().err
+        assert status == 2 and message in error and error.count("\n") == 1
+        assert not (tmp_path / "out.json").exists()
+
+
+class TestGrids:
+    @pytest.fixture
+    def plan(self, tmp_path):
+        """A drawing above the vault of the repository's models, in plan."""
+        path = tmp_path / "plan.obj"
+        lines = [[(-0.9, y), (0.9, y)] for y in (-0.5, 0.0, 0.5)] + [
+            [(x, -0.7), (x, 0.7)] for x in (-0.6, 0.0, 0.6)
+        ]
+        text = "".join(f"v {x} {y} 0\n" for line in lines for x, y in line)
+        path.write_text(text + "".join(f"l {2 * k + 1} {2 * k + 2}\n" for k in range(len(lines))))
+        return path
+
+    def test_curves_in_plan_on_a_mesh(self, plan, tmp_path, repository, capsys):
+        (tmp_path / "designs").mkdir()
+        out = tmp_path / "designs" / "vault.json"
+        surface = repository / "models" / "grids" / "vault.obj"
+        options = (
+            "--as",
+            "grid",
+            "--surface",
+            str(surface),
+            "--section",
+            "0.004,0.05",
+            "--material",
+            "1.1e10,0.3",
+        )
+        assert main(["import", str(plan), "--out", str(out), *options]) == 0
+        design = load_design(out)
+        assert design.class_name == "grid" and design.network.n_joints == 9 and design.held is None
+        for words, numbers in (("corners", [0, 2, 6, 8]), ("0,2,8", [0, 2, 8])):
+            assert (
+                main(
+                    [
+                        "import",
+                        str(plan),
+                        "--out",
+                        str(out),
+                        *options,
+                        "--held",
+                        words,
+                        "--overwrite",
+                    ]
+                )
+                == 0
+            )
+            assert load_design(out).held.tolist() == numbers
+        capsys.readouterr()
+        assert (
+            main(
+                ["import", str(plan), "--out", str(out), *options, "--held", "0,1,9", "--overwrite"]
+            )
+            == 2
+        )
+        assert "held = 9: names a joint that doesn't exist" in capsys.readouterr().err
+        found = {tuple(x) for x in design.target.positions[:, :2].round(6).tolist()}
+        assert found == {(x, y) for x in (-0.6, 0.0, 0.6) for y in (-0.5, 0.0, 0.5)}
+
+    @pytest.mark.parametrize(
+        "options, message",
+        [
+            ((), "a grid needs --surface"),
+            (("--surface", "no.obj"), "a grid needs --section"),
+            (("--surface", "no.obj", *OPTIONS[2:]), "surface.file = "),
+            (("--surface", "no.obj", *OPTIONS[2:], "--scale", "2"), "--scale = 2.0: not for grids"),
+        ],
+    )
+    def test_mistakes(self, options, message, plan, tmp_path, capsys):
+        assert (
+            main(
+                ["import", str(plan), "--as", "grid", "--out", str(tmp_path / "out.json"), *options]
+            )
+            == 2
+        )
+        error = capsys.readouterr().err
+        assert message in error and error.count("\n") == 1 and not (tmp_path / "out.json").exists()

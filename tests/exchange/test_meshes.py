@@ -1,0 +1,153 @@
+"""Solids, lines and fields read back by trimesh and meshio, and measured."""
+
+import meshio
+import numpy as np
+import pytest
+import trimesh
+
+from kop_exudyn.errors import InputError
+from kop_exudyn.exchange.gltf import Solid, write_glb
+from kop_exudyn.exchange.meshes import sweep, tube
+from kop_exudyn.exchange.polygons import write_obj, write_ply
+from kop_exudyn.exchange.vtk import element_fields, write_vtu
+from kop_exudyn.rods.rotations import rotation_z
+from kop_exudyn.rods.sections import circle, general, rectangle
+from kop_exudyn.scene.builder import SceneBuilder
+from kop_exudyn.structures.strength import design_strength
+
+
+def rod(section, points, frames=None):
+    builder = SceneBuilder()
+    bodies = builder.bodies(points, frames)
+    builder.rod(builder.nodes(bodies), np.ones(6), length=1.0, section=section)
+    return builder.build()
+
+
+@pytest.fixture(scope="module")
+def deployed(shells):
+    return shells[0].deploy()
+
+
+@pytest.mark.parametrize(
+    "section",
+    [
+        rectangle(0.3, 0.1),
+        circle(0.2),
+        general(
+            1, 1, 1, 1, outline=[[0, 0], [0.4, 0], [0.4, 0.1], [0.1, 0.1], [0.1, 0.4], [0, 0.4]]
+        ),
+    ],
+)
+def test_straight_rods_are_closed_and_have_their_volume(section):
+    scene = rod(section, [[0, 0, 0], [1, 0, 0], [2.5, 0, 0]])
+    mesh = sweep(scene, scene.initial)
+    solid = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    y, z = section.outline.T
+    area = 0.5 * np.sum(y * np.roll(z, -1) - np.roll(y, -1) * z)
+    assert solid.is_watertight and solid.is_winding_consistent
+    assert solid.volume == pytest.approx(2.5 * area)
+    np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), [2.5, np.ptp(y), np.ptp(z)])
+
+
+def test_refined_rods_follow_the_arc_between_nodes():
+    """Two nodes whose poses are a quarter turn apart on a circle: rings in between are on it
+    too."""
+    scene = rod(rectangle(0.1, 0.1), [[0, 0, 0], [1, 1, 0]], rotation_z(np.array([0, np.pi / 2])))
+    mesh = sweep(scene, scene.initial, refinement=8)
+    middles = mesh.vertices.reshape(-1, 4, 3).mean(axis=1)
+    np.testing.assert_allclose(np.linalg.norm(middles - [0, 1, 0], axis=1), 1.0, atol=1e-12)
+    assert len(middles) == 9
+    solid = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    assert solid.volume == pytest.approx(0.01 * np.pi / 2, rel=0.01)
+
+
+def test_coarse_and_refined_rods_agree_at_nodes(shells, deployed):
+    scene = shells[0].scene("deployed")
+    coarse, fine = (sweep(scene, deployed["deployed"].state, refinement=n) for n in (1, 3))
+    at_nodes = fine.vertices.reshape(-1, 4, 3)[::3]
+    elements = sum(len(chain.elements) for chain in scene.chains)
+    assert len(fine.vertices) == 4 * (3 * elements + len(scene.chains))
+    np.testing.assert_allclose(at_nodes[:3], coarse.vertices.reshape(-1, 4, 3)[:3], atol=1e-12)
+
+
+def test_tubes_have_no_holes():
+    faces = tube(3, rectangle(1, 1).outline)
+    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+
+
+def test_rods_without_section_are_refused():
+    scene = rod(None, [[0, 0, 0], [1, 0, 0]])
+    with pytest.raises(InputError, match="section"):
+        sweep(scene, scene.initial)
+    assert len(sweep(scene, scene.initial, outline=rectangle(1, 1).outline).vertices) == 8
+
+
+def test_glb_read_by_trimesh(shells, deployed, tmp_path):
+    mesh = sweep(shells[0].scene("deployed"), deployed["deployed"].state)
+    path = write_glb(
+        tmp_path / "shell.glb",
+        [Solid("rods", mesh.vertices, mesh.faces, np.array([1.0, 0.5, 0.0]))],
+    )
+    scene = trimesh.load(path)
+    found = scene.to_geometry()
+    assert len(found.faces) == len(mesh.faces)
+    turned = mesh.vertices[:, [0, 2, 1]] * [1, 1, -1]  # z up to y up
+    np.testing.assert_allclose(found.bounds, [turned.min(axis=0), turned.max(axis=0)], atol=1e-6)
+    assert found.volume == pytest.approx(
+        trimesh.Trimesh(mesh.vertices, mesh.faces).volume, rel=1e-4
+    )
+
+
+def test_ply_read_by_trimesh_and_meshio(shells, deployed, tmp_path):
+    mesh = sweep(shells[0].scene("rest"), deployed["rest"].state)
+    colours = np.tile([1.0, 0.0, 0.2], (len(mesh.vertices), 1))
+    path = write_ply(tmp_path / "rest.ply", mesh, colours)
+    found = trimesh.load(path, process=False)
+    np.testing.assert_array_equal(found.vertices, mesh.vertices)
+    np.testing.assert_array_equal(
+        found.visual.vertex_colors[:, :3], np.tile([255, 0, 51], (len(mesh.vertices), 1))
+    )
+    again = meshio.read(path)
+    np.testing.assert_array_equal(again.cells_dict["triangle"], mesh.faces)
+    np.testing.assert_array_equal(again.point_data["rod"], mesh.chains)
+
+
+def test_obj_lines(shells, deployed, tmp_path):
+    lines = shells[0].scene("deployed").polylines(deployed["deployed"].state)
+    path = write_obj(tmp_path / "lines.obj", lines)
+    text = path.read_text().splitlines()
+    vertices = np.array([line.split()[1:] for line in text if line.startswith("v ")], float)
+    found = [
+        vertices[np.array(line.split()[1:], int) - 1] for line in text if line.startswith("l ")
+    ]
+    assert len(found) == len(lines)
+    for a, b in zip(found, lines):
+        np.testing.assert_array_equal(a, b)
+    named = write_obj(tmp_path / "named.obj", lines[:2], ["rod 1", "rod 2"]).read_text()
+    assert "g rod_1\n" in named
+
+
+def test_vtu_read_by_meshio(shells, deployed, tmp_path):
+    scene, eq = shells[0].scene("deployed"), deployed["deployed"]
+    strength = design_strength(shells[0], deployed)["deployed"]
+    found = meshio.read(
+        write_vtu(tmp_path / "state.vtu", scene, eq, element_fields(scene, eq, strength))
+    )
+    np.testing.assert_array_equal(found.points, scene.node_poses(eq.state)[0])
+    np.testing.assert_array_equal(found.cells_dict["line"], scene.elements)
+    fields = {name: values[0] for name, values in found.cell_data.items()}
+    np.testing.assert_array_equal(fields["My"], eq.stress[:, 4])
+    np.testing.assert_array_equal(fields["utilisation"], strength.utilisation)
+    energy = 0.5 * np.sum(
+        fields["rest_length"]
+        * sum(
+            fields[s] * fields[r]
+            for s, r in zip(
+                ("stretch", "shear_y", "shear_z", "twist", "curvature_y", "curvature_z"),
+                ("N", "Qy", "Qz", "Mt", "My", "Mz"),
+            )
+        )
+    )
+    assert energy == pytest.approx(eq.elastic_energy, rel=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(found.point_data["tangent"], axis=1), 1)

@@ -1,0 +1,62 @@
+"""An optimisation's result is the same to the last bit, however many processes solve its designs,
+and when."""
+
+from __future__ import annotations
+
+import pytest
+import scipy.linalg  # noqa: F401  # whose BLAS has to be there before its threads are counted
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from kop_exudyn.io.datasets import load_designs
+from kop_exudyn.search.dataset import Dataset
+from kop_exudyn.search.objective import Weights
+from kop_exudyn.search.pool import DesignPool
+from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.stages import Stages
+
+
+def tuned(designs, jobs: int) -> tuple:
+    """Parameters and objectives of a few steps over the parts, which lead far from the direct
+    projection."""
+    values: list[float] = []
+    with DesignPool(designs, jobs) as pool:
+        pool.prepare()
+        stages = Stages(
+            Dataset.of_pool(pool, Weights.suiting(designs)),
+            {"linear": 6, "angular": 3},
+            StageSettings(assigned_steps=5),
+            None,
+            lambda event: values.append(event.record.value),
+        )
+        result = stages.assigned(stages.direct(), "unrelaxed")
+    assert len(values) == 5
+    return values, [evaluation.q.tobytes() for evaluation in result.designs]
+
+
+@pytest.mark.parametrize("folder", ["small", "grids"])
+def test_results_depend_on_no_process(repository, folder):
+    designs = load_designs(repository / "models" / folder, 3)
+    alone = tuned(designs, 1)
+    for jobs in (2, 3, 2):
+        assert tuned(designs, jobs) == alone, jobs
+
+
+def test_one_thread_for_the_blas_while_designs_are_solved(repository):
+    """Its sums would depend on how many cores there are."""
+
+    def threads() -> dict[str, int]:
+        """Of the libraries that have threads: other packages bring one without."""
+        return {
+            library["filepath"]: library["num_threads"]
+            for library in threadpool_info()
+            if library["user_api"] == "blas" and library.get("threading_layer") != "disabled"
+        }
+
+    pool = DesignPool(load_designs(repository / "models" / "small", 1))
+    with threadpool_limits(2, user_api="blas"):
+        before = threads()
+        assert before and set(before.values()) == {2}
+        with pool:
+            assert set(threads().values()) == {1}
+        # others may have been loaded meanwhile
+        assert {library: threads()[library] for library in before} == before
