@@ -22,10 +22,14 @@ _MAX_SHIFTS = 40
 
 @dataclass(frozen=True)
 class Border:
-    """The constraint seen through the factorised matrix: K^-1 c and c.K^-1 c."""
+    """The constraint seen through the factorised matrix: K^-1 c and c.K^-1 c.
+
+    number : of the factorisation, as `System.number`; a border serves that one alone
+    """
 
     column: np.ndarray
     schur: float
+    number: int = 0
 
 
 def factorise_convex(system: System, shift: float = 0.0) -> tuple[float, Border | None]:
@@ -62,9 +66,9 @@ def border_of(system: System) -> Border | None:
     if system.constraint is None:
         return None
     if system.singular:
-        return Border(np.full(system.n_unknowns, np.nan), 0.0)
+        return Border(np.full(system.n_unknowns, np.nan), 0.0, system.number)
     column = system.solve_constraint()
-    return Border(column, float(system.constraint @ column))
+    return Border(column, float(system.constraint @ column), system.number)
 
 
 def is_convex(negative: int, border: Border | None) -> bool:
@@ -83,7 +87,10 @@ def bordered_solve(
     system: System, border: Border | None, rhs: np.ndarray, gap: float | np.ndarray = 0.0
 ) -> tuple[np.ndarray, np.ndarray | float]:
     """Solve K d + c t = rhs, c.d = gap; rhs (n,) or (n, k), gap scalar or (k,). Returns d and t (0
-    without border)."""
+    without border). Raises RuntimeError for a border of another factorisation than the one at
+    hand."""
+    if border is not None and border.number != system.number:
+        raise RuntimeError("the border belongs to an earlier factorisation; see border_of")
     d = system.solve(rhs)
     if border is None:
         return d, 0.0

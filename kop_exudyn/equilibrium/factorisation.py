@@ -6,7 +6,10 @@ import numpy as np
 import qdldl
 import scipy.sparse as sp
 
+from ..errors import SimulationFailure
 from .block_solve import Solutions, panels_of, solve_columns
+
+_SINGULAR = "the stiffness is singular: a pivot is exactly zero, as at a bifurcation"
 
 
 class Factorisation:
@@ -30,21 +33,24 @@ class Factorisation:
             else:
                 self._solver.update(upper, upper=True)
         except RuntimeError:  # an exactly zero pivot: as bad as a negative one
-            self._solver = None
+            self._solver = self._factors = None  # what is left is of an earlier matrix
             self.pivots = np.array([0.0])
             return 1
-        self._factors = self._solver.factors()
-        self.pivots = self._factors[1]
+        factors = self._solver.factors()
+        self.pivots = factors[1]
+        # an exactly zero last pivot is no error to QDLDL
+        self._factors = factors if self.pivots.all() else None
         return int(np.count_nonzero(~(self.pivots > 0)))
 
     @property
     def singular(self) -> bool:
         """Whether the last update met an exactly zero pivot: there is nothing to solve with."""
-        return self._solver is None
+        return self._factors is None
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
-        """Solve for one right-hand side (n,) or for a few (n, k)."""
-        assert self._solver is not None
+        """Solve for one right-hand side (n,) or for a few (n, k). SimulationFailure if singular."""
+        if self._solver is None or self._factors is None:
+            raise SimulationFailure(_SINGULAR)
         if rhs.ndim == 1:
             return self._solver.solve(rhs)
         return np.stack(
@@ -58,8 +64,9 @@ class Factorisation:
         column: np.ndarray | None = None,
     ) -> Solutions:
         """Solve for many sparse right-hand sides (n, k), bordered by a constraint (n,) if its
-        column is given too."""
-        assert self._factors is not None
+        column is given too. SimulationFailure if singular."""
+        if self._factors is None:
+            raise SimulationFailure(_SINGULAR)
         L, pivots, order = self._factors
         if self._panels is None:
             self._panels = panels_of(L.indptr, L.indices)

@@ -245,12 +245,14 @@ class _Run:
             converged = (
                 self._mixed() if self.options.mixed and self.escapes == 1 else self._descend(60)
             )
+        q = np.array(self.q, float)
         # taken at a predicted stress, however close, the factors aren't those that another process
         # would make of the state
-        self.system.factorised_at = self.state if self.assembled is None else None
+        if self.assembled is None:
+            self.system.mark_held(self.state, q)
         return Equilibrium(
             state=self.state,
-            q=np.array(self.q, float),
+            q=q,
             opening=self.opening,
             torque=self.torque,
             stress=self.system.stress(),

@@ -16,7 +16,7 @@ from ..rods.element import length_derivative
 from ..scene.scene import Scene
 from ..scene.state import State
 from .block_solve import Solutions
-from .direction import border_of, bordered_solve
+from .direction import Border, border_of, bordered_solve
 from .newton import Equilibrium, Start
 from .system import System
 
@@ -29,18 +29,16 @@ class Sensitivities:
     """All first derivatives of one equilibrium, and the exact second derivatives of its potential
     energy.
 
-    Nothing is computed before it is asked for. Uses (and if need be restores) the factorisation in
-    the system.
+    Nothing is computed before it is asked for. The factorisation is the system's, which others may
+    use in between: where it has moved on, the equilibrium's own is made again before it is used.
+
+    What needs a solve raises SimulationFailure where the stiffness is exactly singular.
     """
 
     def __init__(self, system: System, equilibrium: Equilibrium):
-        self.system, self.equilibrium = system, equilibrium
-        if system.factorised_at is not equilibrium.state:
-            system.set_parameters(equilibrium.q)
-            system.assemble(equilibrium.state)
-            system.factorise()
-            system.factorised_at = equilibrium.state
-        self._border = border_of(system)
+        self._system, self.equilibrium = system, equilibrium
+        system.linearise(equilibrium.state, equilibrium.q)
+        self._lengths = system.lengths
         scene, s = system.scene, system.sparsity
         self._strain = system.strain.copy()
         energy_L, stress_L, self._energy_LL = length_derivative(
@@ -50,10 +48,14 @@ class Sensitivities:
         self._has = np.flatnonzero(scene.length_parameter >= 0)
         self._driven_values = system.values[s.n_factor_values :].copy()
         self._gradient = system.gradient.copy()
-        # the system's own: like its factorisation, good until it moves on
-        self._B = system.strain_displacement
         self._length_entries = self._differentiate_by_length()
         self._residual_q = self._assemble_residual_q()
+
+    @property
+    def system(self) -> System:
+        """The system, with this equilibrium's Hessian and factorisation in it."""
+        self._system.linearise(self.equilibrium.state, self.equilibrium.q)
+        return self._system
 
     # -- states --------------------------------------------------------------------------------
     @cached_property
@@ -72,8 +74,8 @@ class Sensitivities:
     def rows(self, dofs: np.ndarray) -> np.ndarray:
         """Derivatives (m, n_parameters) of any unknowns of the scene, pinned (zero) and driven ones
         included."""
-        kept = self.system.sparsity.kept[dofs]
-        out = np.zeros((len(kept), self.system.scene.n_parameters))
+        kept = self._system.sparsity.kept[dofs]
+        out = np.zeros((len(kept), self._system.scene.n_parameters))
         free = (kept >= 0) & (kept < self._n)
         out[free] = self.solutions.rows(kept[free])
         driven = kept >= self._n
@@ -86,13 +88,13 @@ class Sensitivities:
 
     def angles(self, hinges: np.ndarray) -> np.ndarray:
         """Derivatives (m, n_parameters) of hinge angles."""
-        return self.rows(6 * self.system.scene.n_bodies + np.asarray(hinges))
+        return self.rows(6 * self._system.scene.n_bodies + np.asarray(hinges))
 
     @cached_property
     def torque_gradient(self) -> np.ndarray:
         """Derivative (n_parameters,) of the actuation's multiplier, zero without actuation."""
         if self._border is None:
-            return np.zeros(self.system.scene.n_parameters)
+            return np.zeros(self._system.scene.n_parameters)
         return -(self._residual_q.T @ self._border.column) / self._border.schur
 
     @cached_property
@@ -106,8 +108,8 @@ class Sensitivities:
     def adjoint(self, dofs: np.ndarray, cotangent: np.ndarray) -> np.ndarray:
         """Gradient (n_parameters,) of J given dJ/d(unknowns) (m,) at some unknowns: one solve, no
         x_q."""
-        kept = self.system.sparsity.kept[dofs]
-        load = np.zeros(self._n + self.system.sparsity.n_driven)
+        kept = self._system.sparsity.kept[dofs]
+        load = np.zeros(self._n + self._system.sparsity.n_driven)
         np.add.at(load, kept[kept >= 0], np.asarray(cotangent, float)[kept >= 0])
         return self._by_load(load)
 
@@ -116,12 +118,12 @@ class Sensitivities:
     def stresses(self) -> np.ndarray:
         """Derivatives (E, 6, n_parameters) of the elements' generalised stresses; memory E x 6 x
         n_parameters."""
-        scene, s = self.system.scene, self.system.sparsity
+        scene, s = self._system.scene, self._system.sparsity
         kept = np.concatenate(
             [self.full, self._driven_map.toarray(), np.zeros((1, scene.n_parameters))]
         )
         out = np.empty((len(scene.elements), 6, scene.n_parameters))
-        factor = self._B * (scene.stiffness / self.system.lengths[:, None])[:, :, None]
+        factor = self._B * (scene.stiffness / self._lengths[:, None])[:, :, None]
         for first in range(0, len(out), _CHUNK):  # absent unknowns (-1) read the row of zeros
             some = slice(first, first + _CHUNK)
             np.matmul(factor[some], kept[s.rows[some]], out=out[some])
@@ -156,14 +158,14 @@ class Sensitivities:
     @cached_property
     def potential_hessian(self) -> np.ndarray:
         """Exact d2(potential)/dq2 (n_parameters, n_parameters): Pi_qq + Pi_qx x_q."""
-        scene = self.system.scene
+        scene = self._system.scene
         twice = np.zeros(scene.n_parameters)
         factor = scene.length_factor[self._has]
         np.add.at(twice, scene.length_parameter[self._has], factor**2 * self._energy_LL[self._has])
         explicit = sp.diags_array(twice)
         driven = self._driven_map
         if driven.shape[0]:
-            upper = self.system.sparsity.driven_columns(self._driven_values)[1]
+            upper = self._system.sparsity.driven_columns(self._driven_values)[1]
             block = upper + sp.triu(upper, 1).T
             lengths_driven = driven.T @ self._lengths_in_driven()
             explicit = explicit + (lengths_driven + lengths_driven.T + driven.T @ block @ driven)
@@ -200,7 +202,7 @@ class Sensitivities:
     def trusted(self) -> bool:
         """Whether derivatives can be relied on: False close to a bifurcation or limit point, and
         under moments without potential, whose tangent's skew part is not in the factorisation."""
-        if not self.system.conservative:
+        if not self._system.conservative:
             return False
         # columns in uneven shares: in a plain sum those of symmetric parameters could cancel out of
         # the softest mode
@@ -209,37 +211,48 @@ class Sensitivities:
         size = np.abs(probe).max(initial=0.0)
         if size == 0.0:
             return True
-        if self.system.factorised_at is not self.equilibrium.state:
+        system, border = self.system, self._border
+        if system.singular:
             return False
-        d, t = bordered_solve(self.system, self._border, probe)
-        residual = self.system.multiply(d) - probe
-        if self._border is not None and self.system.constraint is not None:
-            residual = residual + self.system.constraint * t
+        d, t = bordered_solve(system, border, probe)
+        residual = system.multiply(d) - probe
+        if system.constraint is not None:
+            residual = residual + system.constraint * t
         return bool(
             np.isfinite(residual).all() and np.abs(residual).max() <= _TRUSTED_RESIDUAL * size
         )
 
     # -- pieces --------------------------------------------------------------------------------
     @property
+    def _border(self) -> Border | None:
+        """The constraint through this equilibrium's factorisation, solved for once each."""
+        return border_of(self.system)
+
+    @property
+    def _B(self) -> np.ndarray:
+        """The elements' (E, 6, 14) derivatives of strains, in the system's own array."""
+        return self.system.strain_displacement
+
+    @property
     def _n(self) -> int:
-        return self.system.n_unknowns
+        return self._system.n_unknowns
 
     @property
     def _loaded(self) -> bool:
-        return bool(self.system.scene.terms) or self.system.scene.weight is not None
+        return bool(self._system.scene.terms) or self._system.scene.weight is not None
 
     @cached_property
     def _driven_map(self) -> sp.csr_matrix:
         """d(driven unknowns)/dq (n_driven, n_parameters)."""
-        d = self.system.scene.driven
+        d = self._system.scene.driven
         return sp.csr_matrix(
             (d.factors, (np.arange(len(d.dofs)), d.parameters)),
-            shape=(len(d.dofs), self.system.scene.n_parameters),
+            shape=(len(d.dofs), self._system.scene.n_parameters),
         )
 
     def _by_parameter(self, per_element: np.ndarray) -> np.ndarray:
         """Sum element values (E,), derivatives in the rest length, into their parameters."""
-        scene, has = self.system.scene, self._has
+        scene, has = self._system.scene, self._has
         return np.bincount(
             scene.length_parameter[has],
             scene.length_factor[has] * per_element[has],
@@ -249,18 +262,18 @@ class Sensitivities:
     def _differentiate_by_length(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Entries of d(gradient)/d(lengths' parameters): kept rows, parameters, values, one after
         the other."""
-        scene, has = self.system.scene, self._has
+        scene, has = self._system.scene, self._has
         block = np.einsum("eri,er->ei", self._B[has], self._stress_L[has])
         if scene.weight is not None:
             block += _weight_gradient_per_length(scene, self.equilibrium.state)[has]
-        rows = self.system.sparsity.rows[has]
+        rows = self._system.sparsity.rows[has]
         columns = np.broadcast_to(scene.length_parameter[has][:, None], rows.shape)
         keep = rows >= 0
         return rows[keep], columns[keep], (block * scene.length_factor[has][:, None])[keep]
 
     def _assemble_residual_q(self) -> sp.csc_matrix:
         """R_q (n_free, n_parameters)."""
-        scene, s = self.system.scene, self.system.sparsity
+        scene, s = self._system.scene, self._system.sparsity
         rows, columns, values = self._length_entries
         if s.n_driven:
             # the Hessian's columns of driven unknowns, each for the one parameter that drives it
@@ -279,18 +292,16 @@ class Sensitivities:
         driven = rows >= self._n
         return sp.csr_matrix(
             (values[driven], (rows[driven] - self._n, columns[driven])),
-            shape=(self.system.sparsity.n_driven, self.system.scene.n_parameters),
+            shape=(self._system.sparsity.n_driven, self._system.scene.n_parameters),
         )
 
     def _stress_change(self, kept: np.ndarray, dq: np.ndarray) -> np.ndarray:
         """First-order change (E, 6) of the generalised stresses, for an increment of the kept
         unknowns and of q."""
-        scene, s = self.system.scene, self.system.sparsity
+        scene, s = self._system.scene, self._system.sparsity
         increment = np.append(kept, 0.0)[s.rows]  # absent unknowns (-1) read the appended zero
         change = (
-            np.einsum("eri,ei->er", self._B, increment)
-            * scene.stiffness
-            / self.system.lengths[:, None]
+            np.einsum("eri,ei->er", self._B, increment) * scene.stiffness / self._lengths[:, None]
         )
         has = self._has
         change[has] += (
@@ -301,7 +312,7 @@ class Sensitivities:
 
     def _weight_energy_L(self) -> np.ndarray | float:
         """d(load potential)/dL (E,) of dead loads: -w.(x_0 + x_1)/2."""
-        scene = self.system.scene
+        scene = self._system.scene
         if scene.weight is None:
             return 0.0
         x = scene.node_poses(self.equilibrium.state)[0]
@@ -321,10 +332,8 @@ class Sensitivities:
     def _scattered(self, values: np.ndarray) -> np.ndarray:
         """B^T C v summed into the kept unknowns, for v (E, 6) and the elements' stiffnesses C =
         stiffness / length."""
-        s, scene = self.system.sparsity, self.system.scene
-        block = np.einsum(
-            "eri,er->ei", self._B, scene.stiffness * values / self.system.lengths[:, None]
-        )
+        s, scene = self._system.sparsity, self._system.scene
+        block = np.einsum("eri,er->ei", self._B, scene.stiffness * values / self._lengths[:, None])
         keep = s.rows >= 0
         return np.bincount(s.rows[keep], block[keep], minlength=s.n_free + s.n_driven)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -10,6 +11,9 @@ import scipy.sparse.linalg as spla
 
 from .direction import bordered_solve, factorise_convex
 from .system import System
+
+if TYPE_CHECKING:
+    from .newton import Equilibrium
 
 
 @dataclass(frozen=True)
@@ -21,14 +25,17 @@ class SoftestMode:
     vector: np.ndarray
 
 
-def softest_mode(system: System) -> SoftestMode:
-    """Lowest eigenvalue of K v = lambda M v on the actuation's kernel, for the Hessian assembled
-    last.
+def softest_mode(system: System, equilibrium: Equilibrium | None = None) -> SoftestMode:
+    """Lowest eigenvalue of K v = lambda M v on the actuation's kernel.
+
+    equilibrium : where the Hessian is taken; default: whatever state was assembled last
 
     M is the system's metric (1 for rotations, 1 / length_scale^2 for translations), so the
     eigenvalue is an energy and doesn't depend on the unit of length. Shift-and-invert Lanczos;
     leaves a shifted factorisation behind.
     """
+    if equilibrium is not None:
+        system.linearise(equilibrium.state, equilibrium.q)
     shift, border = factorise_convex(system)
     n, metric = system.n_unknowns, system.metric
     # work in the scaled unknowns M^1/2 v, where the problem is a standard one
@@ -50,8 +57,12 @@ def softest_mode(system: System) -> SoftestMode:
     return SoftestMode(float(1 / largest - shift), vector / scale)
 
 
-def stiffness_matrix(system: System) -> sp.csc_matrix:
-    """The full symmetric Hessian (n_free, n_free) assembled last, for looking at and for other
-    people's solvers."""
+def stiffness_matrix(system: System, equilibrium: Equilibrium | None = None) -> sp.csc_matrix:
+    """The full symmetric Hessian (n_free, n_free), for looking at and for other people's solvers.
+
+    equilibrium : where it is taken; default: whatever state was assembled last
+    """
+    if equilibrium is not None:
+        system.linearise(equilibrium.state, equilibrium.q)
     upper = system.sparsity.free_matrix(system.values)
     return (upper + sp.triu(upper, 1).T).tocsc()

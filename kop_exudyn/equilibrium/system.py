@@ -3,6 +3,7 @@ topology."""
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -51,14 +52,20 @@ class Energy:
 
 
 class System:
-    """Solver workspace of one scene. Not to be shared between threads or processes.
+    """Solver workspace of one scene.
 
     After `assemble`, `gradient` (n_kept,), `values`, `strain` (E, 6) and `strain_displacement` (E,
-    6, 14) belong to the state assembled last.
+    6, 14) belong to the state assembled last; the factorisation to whatever `factorise` was called
+    on last. Who reads them later, after others may have worked with the same system, asks for them
+    with `linearise`, which costs nothing where they are still at hand.
+
+    A system belongs to the thread that made it: in another one `set_parameters`, `assemble` and
+    `factorise` raise RuntimeError, since two threads would overwrite each other's arrays.
     """
 
     def __init__(self, scene: Scene):
         self.scene = scene
+        self._thread = threading.get_ident()
         self.sparsity = s = sparsity_of(scene)
         n_elements = len(scene.elements)
         self.values = np.zeros(s.n_values)
@@ -77,8 +84,9 @@ class System:
         self.constraint = self._constraint()
         self._forces: tuple[float, float] | None = None  # of the state assembled last
         self._constraint_solution: np.ndarray | None = None  # of the factorisation at hand
-        # where the unshifted, unmixed Hessian at hand was factorised
-        self.factorised_at: State | None = None
+        self.number = 0  # of the factorisation at hand, counted from 1
+        # state and parameters whose own (unshifted, unmixed) Hessian is assembled and factorised
+        self._held: tuple[State, np.ndarray] | None = None
         self.is_rotation = self._dof_is_rotation()[s.free]
         self.rotations = np.flatnonzero(self.is_rotation)  # taking numbers is quicker than a mask
         # moments count as forces
@@ -101,17 +109,43 @@ class System:
 
     def set_parameters(self, q: np.ndarray) -> None:
         """Take the rest lengths of q; raises SimulationFailure unless they are positive."""
+        self._check_thread()
         self.lengths = self.scene.rest_lengths(q)
-        self._forces = None
+        self._held = self._forces = None
+
+    def holds(self, state: State, q: np.ndarray) -> bool:
+        """Whether the Hessian at hand, assembled and factorised, is the one of a state (that very
+        object) at the parameters q."""
+        if self._held is None or self._held[0] is not state:
+            return False
+        return self._held[1] is q or np.array_equal(self._held[1], q)
+
+    def mark_held(self, state: State, q: np.ndarray) -> None:
+        """Note that the Hessian at hand is the state's own at the parameters q (not to be changed
+        afterwards), neither shifted nor mixed."""
+        self._held = (state, q)
+
+    def linearise(self, state: State, q: np.ndarray) -> None:
+        """Hold gradient, Hessian and factorisation of a state at the parameters q.
+
+        They are made anew unless they are at hand. Raises SimulationFailure for rest lengths that
+        are not positive.
+        """
+        if not self.holds(state, q):
+            self.set_parameters(q)
+            self.assemble(state)
+            self.factorise()
+            self.mark_held(state, q)
 
     def assemble(self, state: State, order: int = HESSIAN, mixed: bool = False) -> Energy:
         """Energy, and up to the order asked for gradient and Hessian, at a state.
 
         mixed : take the geometric stiffness at `predicted_stress` instead of the state's own stress
         """
+        self._check_thread()
         begin = perf_counter()
         scene, s, count = self.scene, self.sparsity, self.counters
-        self.factorised_at = self._forces = None
+        self._held = self._forces = None
         if order >= GRADIENT:
             self.gradient[:] = 0.0
         if order == HESSIAN:
@@ -179,15 +213,17 @@ class System:
     def factorise(self, shift: float = 0.0) -> int:
         """Factorise the assembled Hessian plus shift times the metric; returns how many pivots are
         not positive."""
+        self._check_thread()
         begin = perf_counter()
         if shift:
             diagonal = self.values[self.sparsity.diagonal]
             self.values[self.sparsity.diagonal] = diagonal + shift * self.metric
         negative = self.factorisation.update(self._matrix)
         self._constraint_solution = None
+        self.number += 1
         if shift:
             self.values[self.sparsity.diagonal] = diagonal
-        self.factorised_at = None
+        self._held = None
         self.counters.factorisations += 1
         self.counters.factorisation_s += perf_counter() - begin
         return negative
@@ -241,6 +277,13 @@ class System:
                 float(np.finfo(float).eps * scene.size * stretch),
             )
         return self._forces
+
+    def _check_thread(self) -> None:
+        if threading.get_ident() != self._thread:
+            raise RuntimeError(
+                "a System is the workspace of the thread that made it; another thread needs a "
+                "System of its own (System(scene), or design.systems asked for there)"
+            )
 
     def _dof_is_rotation(self) -> np.ndarray:
         rotation = np.ones(self.scene.n_dofs, bool)

@@ -9,6 +9,7 @@ every term is divided by its own scale, so F doesn't change with units. The term
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -128,7 +129,7 @@ class DesignDerivatives:
 
 class DesignObjective:
     """F of one design, with the solver workspaces and Exudyn models that it needs, each made at
-    first use."""
+    first use: by each thread that works with it for itself."""
 
     def __init__(
         self, design: Design, weights: Weights = Weights(), reference: Reference | None = None
@@ -141,7 +142,7 @@ class DesignObjective:
             for name, weight in weights.of_terms().items()
             if weight
         ]
-        self._models: dict[str, ExudynModel] = {}
+        self._own = threading.local()
 
     def evaluate(
         self, q: np.ndarray, previous: Evaluation | None = None, options: NewtonOptions = _TRIAL
@@ -200,12 +201,13 @@ class DesignObjective:
         if evaluation.confirmations:
             return evaluation
         confirmations, equilibria = {}, {}
+        models: dict[str, ExudynModel] = self._own.__dict__.setdefault("models", {})
         for role in self.design.roles:
-            if role.name not in self._models:
-                self._models[role.name] = ExudynModel(self.design.scene(role.name))
+            if role.name not in models:
+                models[role.name] = ExudynModel(self.design.scene(role.name))
             refined = refine(self.design.systems[role.name], evaluation.equilibria[role.name])
             try:
-                confirmations[role.name] = self._models[role.name].confirm(refined)
+                confirmations[role.name] = models[role.name].confirm(refined)
             except SimulationFailure as failure:
                 raise failure.within(f"{self.design.name}: {role.name} state") from None
             equilibria[role.name] = replace(refined, state=confirmations[role.name].state)

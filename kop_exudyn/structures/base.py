@@ -7,6 +7,7 @@ to change.
 
 from __future__ import annotations
 
+import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from ..equilibrium.system import System
     from ..scene.scene import Scene
     from ..scene.state import State
+
+_WORKSPACES = "_workspaces"  # of the solver, by thread
 
 
 @dataclass(frozen=True)
@@ -113,17 +116,20 @@ class Design(ABC):
     def fitted_role(self) -> Role:
         return next(role for role in self.roles if role.fitted)
 
-    @cached_property
+    @property
     def systems(self) -> dict[str, System]:
-        """Solver workspaces, one a role, made at first use."""
-        from ..equilibrium.system import System
+        """Solver workspaces, one a role, made at first use: each thread has its own."""
+        own = self.__dict__.setdefault(_WORKSPACES, threading.local())
+        if not hasattr(own, "systems"):
+            from ..equilibrium.system import System
 
-        return {role.name: System(self.scene(role.name)) for role in self.roles}
+            own.systems = {role.name: System(self.scene(role.name)) for role in self.roles}
+        return own.systems
 
     def __getstate__(self) -> dict[str, Any]:
         """What travels to another process: everything but the solver workspaces, which are made
         anew there."""
-        return {key: value for key, value in self.__dict__.items() if key != "systems"}
+        return {key: value for key, value in self.__dict__.items() if key != _WORKSPACES}
 
     @property
     def free(self) -> np.ndarray:
