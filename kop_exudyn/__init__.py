@@ -36,7 +36,7 @@ _PUBLIC = {
     "fabrication.pieces": ("parts_list_of",),
     "io.results": ("load_result",),
     "io.saved_runs": ("load_run",),
-    "fabrication.templates": ("CutOptions",),
+    "fabrication.options": ("CutOptions",),
     "report.kit_run": ("optimize_kit",),
 }
 _MODULE_OF = {name: module for module, names in _PUBLIC.items() for name in names}

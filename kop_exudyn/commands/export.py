@@ -62,8 +62,8 @@ def run(args: argparse.Namespace) -> int:
 
     from ..exchange.export import export_desk, export_workshop
     from ..fabrication.assembly_drawing import save_assembly_drawings
+    from ..fabrication.options import CutOptions
     from ..fabrication.pieces import parts_list_of
-    from ..fabrication.templates import CutOptions
     from ..io.datasets import load_designs
     from ..io.saved_runs import load_run
 

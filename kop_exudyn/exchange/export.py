@@ -11,13 +11,14 @@ import numpy as np
 from ..drawing.colours import kit_colours, to_linear
 from ..errors import InputError
 from ..fabrication.assembly import write_assembly_plan
-from ..fabrication.cutlist import Tolerances, write_bill, write_cut_list
+from ..fabrication.blanks import Blanks
+from ..fabrication.cutlist import write_bill, write_cut_list
 from ..fabrication.cutsheets import cut_sheets, template_sheets
 from ..fabrication.dxf import write_dxf
+from ..fabrication.options import CutOptions, Tolerances
 from ..fabrication.pieces import PartsList, parts_list_of
 from ..fabrication.placement import PlacedPieces
 from ..fabrication.svg import write_svg
-from ..fabrication.templates import CutOptions
 from ..files.files import file_stem, make_folder
 from ..files.tables import write_csv
 from ..search.objective import Evaluation
@@ -55,12 +56,11 @@ def export_workshop(
     (see `templates`).
     """
     writers = {name: _known(name, SHEET_FORMATS, "formats") for name in formats}
-    sheets = {
-        "cut_sheet": cut_sheets(parts, unit, options),
-        "templates": template_sheets(parts, unit, options),
-    }
+    blanks = Blanks(parts, unit, options)
+    blanks.check()
+    sheets = {"cut_sheet": cut_sheets(blanks), "templates": template_sheets(blanks)}
     folder = make_folder(folder)
-    done = [write_cut_list(folder / "cut_list.csv", parts, unit, tolerances, overwrite=overwrite)]
+    done = [write_cut_list(folder / "cut_list.csv", blanks, tolerances, overwrite=overwrite)]
     for design in parts.designs:
         name, stem = design.design.name, file_stem(design.design.name)
         done.append(write_bill(folder / f"bill_{stem}.csv", parts, [name], overwrite=overwrite))

@@ -10,7 +10,8 @@ import numpy as np
 
 from ..files.tables import write_csv
 from ..kit.kinds import part_kind
-from .cutlist import millimetres
+from .lamellas import LOWER, Lamellas
+from .options import millimetres
 from .pieces import PartsList, Piece
 from .placement import PlacedPieces
 
@@ -18,27 +19,78 @@ from .placement import PlacedPieces
 def assembly_plan(parts: PartsList, name: str, unit: str) -> list[dict[str, Any]]:
     """One row an element of the design of that name, in the elements' order.
 
-    Of a beam: the joint that it carries (of a cell: all that its bars end at), and for each of its
-    sides the part's side used there, its length and the corner or free end that it leads to. Of a
-    corner: its signed turn, and the elements before and after it; positive turns are
+    Of all: the lamella that it belongs to, and its place along it, from 1 (see `lamellas`).
+    Of a beam: the joint that it carries (of a cell: all that its bars end at), whether it is the
+    lower or the upper one there and which lamella it crosses, and for each of its sides in the
+    lamella's direction the part's side used there, its length and the corner or free end that it
+    leads to. Of a corner: its signed turn, and the elements before and after it; positive turns are
     counter-clockwise about the hinge axis when walking from "before" to "after".
 
     unit : the designs' unit of length
     Raises InputError for a design that isn't there.
     """
     scale = millimetres(unit)
-    parts.needed([name])  # knows the names
-    placed = PlacedPieces.of(next(d for d in parts.designs if d.design.name == name))
+    placed = PlacedPieces.of(parts.named(name))
+    lamellas, on_edge = Lamellas(placed), stands_on_edge(placed)
     return [
         {
             "element": piece.element,
             "kind": piece.kind,
             "part": parts.label(piece),
             "variant": piece.variant,
+            **_along(lamellas, piece, on_edge),
             **_where(placed, parts, piece, scale),
         }
         for piece in placed.pieces.pieces
     ]
+
+
+def stands_on_edge(placed: PlacedPieces) -> bool:
+    """Whether the joints' axes lie in the rods' boards, so that lamellas cross in slots."""
+    sections = [chain.section for chain in placed.scene.chains if chain.section is not None]
+    y, z = np.ptp(sections[0].outline, axis=0) if sections else (1.0, 0.0)
+    return bool(z > y)
+
+
+def joint_table(parts: PartsList, name: str, unit: str, points: np.ndarray) -> list[dict[str, Any]]:
+    """One row a joint: its place, the pieces that meet there, the angle between them.
+
+    unit : the designs' unit of length
+    points (n_joints, 3) : where the joints are in the built state, in that unit
+    Raises InputError for a design that isn't there.
+    """
+    scale, number = millimetres(unit), parts.row_of(name)
+    placed = PlacedPieces.of(parts.designs[number])
+    lamellas = Lamellas(placed)
+    role = placed.design.fitted_role.name
+    state = parts.states[number][role] if parts.states else placed.scene.initial
+    angles = placed.crossing_angles(state)
+    rows = []
+    for joint, point in enumerate(points, 1):
+        row: dict[str, Any] = {"joint": joint}
+        row |= {f"{axis}_mm": round(scale * float(x), 3) for axis, x in zip("xyz", point)}
+        if joint in lamellas.crossings:
+            lower, upper = lamellas.crossings[joint]
+            row |= {"lower": lower.element, "upper": upper.element}
+        if joint in angles:
+            row["angle_deg"] = round(float(np.degrees(angles[joint])), 2)
+        rows.append(row)
+    return rows
+
+
+def _along(lamellas: Lamellas, piece: Piece, on_edge: bool) -> dict[str, Any]:
+    """Where a piece is along its lamella, and how it crosses the other one."""
+    if piece.element not in lamellas.place:
+        return {}
+    number, place = lamellas.place[piece.element]
+    row: dict[str, Any] = {"lamella": number, "place": place}
+    layer = lamellas.layer.get(piece.element)
+    if layer is not None:
+        row["layer"] = layer
+        if on_edge:
+            row["slot"] = "up" if layer == LOWER else "down"
+        row["crosses"] = lamellas.place[lamellas.crosses[piece.element].element][0]
+    return row
 
 
 def write_assembly_plan(

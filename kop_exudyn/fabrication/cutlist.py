@@ -1,67 +1,44 @@
-"""Cut lists: what to make for a kit, how often, and how exactly; bills of pieces for any of its
+"""Cut lists: what to make for a kit, how often, and how exactly; bills of pieces for its
 designs."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
 from ..files.tables import write_csv
 from ..kit.kinds import PartKind, part_kind
+from .blanks import Blanks, Strip
+from .options import Tolerances
 from .pieces import PartsList
-from .placement import bars_needed
 
-# Millimetres of one unit of length.
-UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
-
-_DIGITS = 4  # of millimetres and degrees: far finer than any tool
+_DIGITS = 3  # of millimetres: sums over a whole lamella stay exact to 0.1 mm
+_DIGITS_DEG = 4
 
 
-@dataclass(frozen=True)
-class Tolerances:
-    """What the workshop should keep to: length in mm, angle in degrees."""
+def cut_list(blanks: Blanks, tolerances: Tolerances = Tolerances()) -> list[dict[str, Any]]:
+    """One row a part: label, kind, pieces to make, pieces in every design, what to cut, tolerance.
 
-    length: float = 0.5
-    angle: float = 0.5
-
-
-def millimetres(unit: str) -> float:
-    """Millimetres of one unit of length; InputError for a unit that isn't known."""
-    if unit not in UNITS:
-        raise InputError(
-            f"unknown unit of length (known: {', '.join(UNITS)})", field="unit", value=unit
-        )
-    return UNITS[unit]
-
-
-def has_joint(kind: PartKind) -> bool:
-    """Whether a kind's parts are beams with a joint between two sides; other parts of lengths are
-    sets of bars."""
-    return kind.parameter_names[:2] == ("l1", "l2")
-
-
-def cut_list(
-    parts: PartsList, unit: str, tolerances: Tolerances = Tolerances()
-) -> list[dict[str, Any]]:
-    """One row a part: label, kind, pieces to make, pieces in every design, dimensions in mm or
-    degrees, tolerance.
-
-    unit : the designs' unit of length Pieces to make serve one design after the other: as many of
-    each part as the neediest design uses. Linear parts also have their whole length and the place
-    of their joint, from the end of side 1; cells the number of their bars.
+    Pieces to make serve one design after the other: as many of each part as the neediest design
+    uses. Lengths of linear parts: `l1_mm` and `l2_mm` are those of the axes, from the joint to the
+    corner points, as designs and assembly plans have them; what is sawn is `cut_length_mm`, with
+    the joint's middle at `hole_from_end_mm` and bolt holes at `bolts_from_end_mm`, all from the
+    sawn end of side 1. `setback_mm` is by how much either end is shorter than its axis. Cells have
+    the number of their bars.
     """
-    scale, needed = millimetres(unit), parts.needed()
     rows = []
+    parts, needed = blanks.parts, blanks.parts.needed()
+    strips = {strip.label: strip for strip in blanks.strips}
+    plates = {plate.label: plate for plate in blanks.plates}
     for name, values in parts.kit.parts.items():
         kind = part_kind(name)
         for number, value in enumerate(values):
+            label = parts.labels[name][number]
             row: dict[str, Any] = {
-                "part": parts.labels[name][number],
+                "part": label,
                 "kind": name,
                 "pieces": int(needed[name][number]),
             }
@@ -69,20 +46,73 @@ def cut_list(
                 f"in_{d.design.name}": int(parts.counts[name][k, number])
                 for k, d in enumerate(parts.designs)
             }
-            if not kind.angular and not has_joint(kind):
-                bars = bars_needed(parts, name)[number]
+            row |= _dimensions(kind, value, blanks.scale, tolerances)
+            row |= {
+                f"bars_{bar.label.removeprefix(label).strip()}": bar.count
+                for bar in blanks.bars
+                if bar.label.startswith(f"{label} ")
+            }
+            if label in strips:
+                row |= _sawn(strips[label])
+            if label in plates:
                 row |= {
-                    f"bars_{which}": int(count) for which, count in zip(kind.parameter_names, bars)
+                    "leg_mm": _mm(plates[label].leg),
+                    "bolts_from_corner_mm": _several(plates[label].bolts),
+                    "bolt_hole_mm": plates[label].bolt_hole,
                 }
-            rows.append(row | _dimensions(kind, value, scale, tolerances))
+            rows.append(row)
+    return rows
+
+
+def totals(blanks: Blanks) -> list[dict[str, Any]]:
+    """One row a sort of material: section, material, pieces, their length in m, their area in
+    m2."""
+    board, strips = blanks.board, blanks.strips
+    rows: list[dict[str, Any]] = []
+    if strips:
+        length = sum(strip.count * strip.cut_length for strip in strips) / 1000
+        rows.append(
+            {
+                "item": "strips",
+                "section_mm": board.section,
+                "material": board.material,
+                "pieces": sum(strip.count for strip in strips),
+                "length_m": round(length, 3),
+                "area_m2": round(length * board.breadth / 1000, 4),
+            }
+        )
+    if blanks.plates:
+        area = sum(plate.count * 2 * plate.leg * board.breadth for plate in blanks.plates)
+        rows.append(
+            {
+                "item": "corner plates",
+                "section_mm": f"{board.thickness:g} thick",
+                "material": board.material,
+                "pieces": sum(plate.count for plate in blanks.plates),
+                "area_m2": round(area / 1e6, 4),
+            }
+        )
+    if blanks.bars:
+        length = sum(bar.count * bar.length for bar in blanks.bars) / 1000
+        rows.append(
+            {
+                "item": "bars",
+                "section_mm": board.section,
+                "material": board.material,
+                "pieces": sum(bar.count for bar in blanks.bars),
+                "length_m": round(length, 3),
+            }
+        )
     return rows
 
 
 def bill_of_pieces(
     parts: PartsList, names: Iterable[str] | None = None, *, together: bool = False
 ) -> list[dict[str, Any]]:
-    """One row a part that some designs need (default: all): label, kind, pieces. See
-    `PartsList.needed`."""
+    """One row a part that some designs need (default: all): label, kind, pieces.
+
+    See `PartsList.needed`.
+    """
     return [
         {"part": parts.labels[kind][number], "kind": kind, "pieces": int(count)}
         for kind, counts in parts.needed(names, together=together).items()
@@ -93,14 +123,13 @@ def bill_of_pieces(
 
 def write_cut_list(
     path: str | Path,
-    parts: PartsList,
-    unit: str,
+    blanks: Blanks,
     tolerances: Tolerances = Tolerances(),
     *,
     overwrite: bool = False,
 ) -> Path:
     """Write `cut_list` as CSV."""
-    return write_csv(path, cut_list(parts, unit, tolerances), overwrite=overwrite)
+    return write_csv(path, cut_list(blanks, tolerances), overwrite=overwrite)
 
 
 def write_bill(
@@ -118,19 +147,36 @@ def write_bill(
 def _dimensions(
     kind: PartKind, values: np.ndarray, scale: float, tolerances: Tolerances
 ) -> dict[str, Any]:
-    """A part's parameters in mm or degrees, and what follows from them."""
+    """A part's parameters in mm or degrees, and how exactly to keep them."""
     if kind.angular:
         angles = {
-            f"{name}_deg": round(float(np.degrees(v)), _DIGITS)
+            f"{name}_deg": round(float(np.degrees(v)), _DIGITS_DEG)
             for name, v in zip(kind.parameter_names, values)
         }
         return angles | {"tolerance_deg": tolerances.angle}
-    lengths = {
-        f"{name}_mm": round(float(v) * scale, _DIGITS)
-        for name, v in zip(kind.parameter_names, values)
-    }
-    if has_joint(kind):
-        l1, l2, slit = (*values, 0.0)[:3]
-        lengths["length_mm"] = round(float(l1 + l2 + 2 * slit) * scale, _DIGITS)
-        lengths["joint_at_mm"] = round(float(l1 + slit) * scale, _DIGITS)
+    lengths = {f"{name}_mm": _mm(v * scale) for name, v in zip(kind.parameter_names, values)}
     return lengths | {"tolerance_mm": tolerances.length}
+
+
+def _sawn(strip: Strip) -> dict[str, Any]:
+    """What is cut of a straight piece."""
+    row: dict[str, Any] = {
+        "cut_length_mm": _mm(strip.cut_length),
+        "hole_from_end_mm": _mm(strip.hole_from_end),
+        "setback_mm": _mm(strip.setback),
+        "bolts_from_end_mm": _several(strip.bolt_stations),
+        "bolt_hole_mm": strip.bolt_hole if strip.bolts else None,
+        "section_mm": strip.board.section,
+        "material": strip.board.material or None,
+    }
+    if strip.slot is None:
+        return row | {"joint_hole_mm": strip.hole}
+    return row | {"slot_width_mm": _mm(strip.slot), "slot_depth_mm": _mm(strip.slot_depth)}
+
+
+def _mm(value: float) -> float:
+    return round(float(value), _DIGITS)
+
+
+def _several(values: Iterable[float]) -> str:
+    return " ".join(f"{value:.{_DIGITS}f}" for value in values)

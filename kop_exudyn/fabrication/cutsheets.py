@@ -1,4 +1,8 @@
-"""Cut sheets: all pieces of a kit laid out on boards, at true scale in millimetres."""
+"""Cut sheets: all pieces of a kit laid out on boards, at true scale in millimetres.
+
+Pieces are packed by rectpack (rectangles about them, the grain's direction kept: nothing is
+turned).
+"""
 
 from __future__ import annotations
 
@@ -8,130 +12,134 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from .pieces import PartsList
+from .blanks import Blanks
+from .options import CutOptions
 from .shapes import NOTES, Polyline, Shape, Text, rectangle
-from .templates import CutOptions, Template, templates
+from .templates import Template, templates
 
 _NOTE_HEIGHT = 6.0  # mm
-_NOTE_ROOM = 14.0  # mm at the sheet's lower edge, for the notes
+_NOTE_ROOM = 24.0  # mm at the sheet's lower edge, for the notes and the scale bar under them
 _SCALE_BAR = 100.0  # mm, to check a print with
+_DIGITS = 6  # of a mm: sizes are packed as whole numbers of these
 
 
 @dataclass(frozen=True)
 class Sheet:
     """One board: its size in mm, its shapes from the lower left corner, and how often each part
-    lies on it."""
+    lies on it.
+
+    title, thickness : what it says below its pieces
+    """
 
     size: tuple[float, float]
     shapes: tuple[Shape, ...]
     labels: dict[str, int]
+    title: str = ""
+    thickness: float = 0.0
 
 
-def cut_sheets(parts: PartsList, unit: str, options: CutOptions = CutOptions()) -> list[Sheet]:
-    """All pieces that the kit's neediest designs use, on as many sheets as they take.
+def cut_sheets(blanks: Blanks) -> list[Sheet]:
+    """All pieces that the kit's neediest designs use, on as many sheets as they take; those of one
+    thickness together.
 
-    unit : the designs' unit of length
     Raises InputError where a piece is larger than a sheet; see also `templates`.
     """
-    wanted = templates(parts, unit, options)
-    return lay_out(wanted, [t.count for t in wanted], "cut sheet", options)
+    wanted = templates(blanks)
+    return lay_out(wanted, [t.count for t in wanted], "cut sheet", blanks.options)
 
 
-def template_sheets(parts: PartsList, unit: str, options: CutOptions = CutOptions()) -> list[Sheet]:
-    """One piece of every part, with its dimensions: templates to check with, or to copy by hand."""
-    wanted = templates(parts, unit, options)
+def template_sheets(blanks: Blanks) -> list[Sheet]:
+    """One piece of every part, with its dimensions: templates to check with, or to copy by
+    hand."""
+    wanted = templates(blanks)
     captioned = [
         Template(t.label, t.name, t.count, (*t.shapes, _caption(t)), t.thickness) for t in wanted
     ]
-    return lay_out(captioned, [1] * len(wanted), "templates", options)
+    return lay_out(captioned, [1] * len(wanted), "templates", blanks.options)
 
 
 def lay_out(
     wanted: Sequence[Template], copies: Sequence[int], title: str, options: CutOptions
 ) -> list[Sheet]:
-    """Rows of pieces, the tallest first and the longest first within them, each in the first row
-    with room for it."""
-    width, height = (
-        options.sheet[0] - 2 * options.margin,
-        options.sheet[1] - 2 * options.margin - _NOTE_ROOM,
-    )
-    order = sorted(range(len(wanted)), key=lambda k: tuple(-_size(wanted[k])[::-1]))
-    rows: list[_Row] = []
-    for k in order:
-        size = _size(wanted[k])
+    """Pieces on sheets, `copies` of each template.
+
+    Raises InputError where a piece is larger than a sheet.
+    """
+    width, height = (side - 2 * options.margin for side in options.sheet)
+    height -= _NOTE_ROOM
+    for template in wanted:
+        size = _size(template)
         if size[0] > width or size[1] > height:
             raise InputError(
-                f"part {wanted[k].label} ({size[0]:.0f} x {size[1]:.0f} mm) is larger than a "
-                f"sheet's "
-                f"{width:.0f} x {height:.0f} mm",
+                f"part {template.label} ({size[0]:.0f} x {size[1]:.0f} mm) is larger than a "
+                f"sheet's {width:.0f} x {height:.0f} mm",
                 field="options.sheet",
                 value=options.sheet,
             )
-        for _ in range(copies[k]):
-            row = next(
-                (r for r in rows if r.length + size[0] <= width and r.height >= size[1]), None
-            )
-            if row is None:
-                row = _Row(size[1])
-                rows.append(row)
-            row.add(wanted[k], size[0], options.gap)
-    sheets = _stack(rows, height, options.gap)
+    found = []
+    for thickness in sorted({template.thickness for template in wanted}, reverse=True):
+        numbers = [k for k, template in enumerate(wanted) if template.thickness == thickness]
+        pieces = [wanted[k] for k in numbers for _ in range(copies[k])]
+        found += [(thickness, on_it) for on_it in _packed(pieces, width, height, options.apart)]
     return [
-        _sheet(on_it, f"{title} {number} of {len(sheets)}", wanted, options)
-        for number, on_it in enumerate(sheets, 1)
+        _sheet(on_it, f"{title} {number} of {len(found)}", thickness, options)
+        for number, (thickness, on_it) in enumerate(found, 1)
     ]
 
 
-class _Row:
-    """Pieces beside each other: (template, x)."""
+def _packed(
+    pieces: Sequence[Template], width: float, height: float, apart: float
+) -> list[list[tuple[Template, float, float]]]:
+    """By sheet: the pieces and their places (x, y). Rectangles grow by the distance between them,
+    and so does the sheet."""
+    import rectpack
 
-    def __init__(self, height: float):
-        self.height, self.length = height, 0.0
-        self.pieces: list[tuple[Template, float]] = []
+    grid = 10.0**_DIGITS
 
-    def add(self, template: Template, width: float, gap: float) -> None:
-        self.pieces.append((template, self.length))
-        self.length += width + gap
+    def whole(value: float) -> int:
+        return int(np.ceil(value * grid - 1e-3))
+
+    packer = rectpack.newPacker(rotation=False, sort_algo=rectpack.SORT_LSIDE)
+    for k, piece in enumerate(pieces):
+        packer.add_rect(*(whole(side + apart) for side in _size(piece)), rid=k)
+    packer.add_bin(whole(width + apart) + 1, whole(height + apart) + 1, count=float("inf"))
+    packer.pack()
+    sheets: list[list[tuple[Template, float, float]]] = []
+    for sheet, x, y, _, _, k in sorted(packer.rect_list(), key=lambda r: (r[0], r[2], r[1])):
+        while len(sheets) <= sheet:
+            sheets.append([])
+        sheets[sheet].append((pieces[k], x / grid, y / grid))
+    return sheets
 
 
 def _size(template: Template) -> np.ndarray:
     return np.ptp(template.box, axis=0)
 
 
-def _stack(rows: Sequence[_Row], height: float, gap: float) -> list[list[tuple[_Row, float]]]:
-    """Rows over each other, each with its height on its sheet."""
-    sheets: list[list[tuple[_Row, float]]] = []
-    y = np.inf
-    for row in rows:
-        if y + row.height > height:
-            sheets.append([])
-            y = 0.0
-        sheets[-1].append((row, y))
-        y += row.height + gap
-    return sheets
-
-
 def _sheet(
-    rows: Sequence[tuple[_Row, float]], title: str, wanted: Sequence[Template], options: CutOptions
+    pieces: Sequence[tuple[Template, float, float]],
+    title: str,
+    thickness: float,
+    options: CutOptions,
 ) -> Sheet:
     width, height = options.sheet
     shapes: list[Shape] = [rectangle(0.0, 0.0, width, height, NOTES)]
     labels: dict[str, int] = {}
-    for row, y in rows:
-        for template, x in row.pieces:
-            by = np.array([options.margin + x, options.margin + _NOTE_ROOM + y]) - template.box[0]
-            shapes += [shape.moved(by) for shape in template.shapes]
-            labels[template.label] = labels.get(template.label, 0) + 1
-    thickness = ", ".join(f"{t:g}" for t in sorted({template.thickness for template in wanted}))
-    note = (
-        f"{title}, material thickness {thickness} mm, all lengths in mm; "
-        f"this line is {_SCALE_BAR:g} mm long:"
-    )
-    y = options.margin
-    start = options.margin + Text(np.zeros(2), _NOTE_HEIGHT, note).box[1, 0] + _NOTE_HEIGHT
-    shapes.append(Text(np.array([options.margin, y]), _NOTE_HEIGHT, note, NOTES, "left"))
-    shapes.append(Polyline(np.array([[start, y], [start + _SCALE_BAR, y]]), False, NOTES))
-    return Sheet(options.sheet, tuple(shapes), labels)
+    corner = np.array([options.margin, options.margin + _NOTE_ROOM])
+    for template, x, y in pieces:
+        by = corner + [x, y] - template.box[0]
+        shapes += [shape.moved(by) for shape in template.shapes]
+        labels[template.label] = labels.get(template.label, 0) + 1
+    note = f"{title}, material {thickness:g} mm thick, all lengths in mm; this line is "
+    note += f"{_SCALE_BAR:g} mm long:"
+    room = (width - 2 * options.margin) / Text(np.zeros(2), 1.0, note).box[1, 0] / 2
+    size = min(_NOTE_HEIGHT, 2 * room)
+    x, y = options.margin, options.margin
+    shapes.append(Text(np.array([x, y + 2.5 * size]), size, note, NOTES, "left"))
+    bar = min(_SCALE_BAR, width - 2 * options.margin)
+    for ends in ([[0, 0], [bar, 0]], [[0, -2], [0, 2]], [[bar, -2], [bar, 2]]):
+        shapes.append(Polyline(np.array(ends, float) + [x, y], False, NOTES))
+    return Sheet(options.sheet, tuple(shapes), labels, title, thickness)
 
 
 def _caption(template: Template) -> Text:

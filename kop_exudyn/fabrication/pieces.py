@@ -9,7 +9,7 @@ the design's joints.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +17,8 @@ import numpy as np
 from ..errors import InputError
 from ..kit.kinds import PartKind, part_kind
 from ..kit.parts import Assignment, Kit
+from ..scene.state import State
+from ..search.objective import Evaluation
 from ..search.result import KitResult
 from ..structures.base import Design
 
@@ -57,10 +59,15 @@ class DesignPieces:
 
 @dataclass(frozen=True)
 class PartsList:
-    """A kit and the pieces of all designs that are built from it."""
+    """A kit and the pieces of all designs that are built from it.
+
+    states : by design, the built states by role: at which angles lamellas cross. Empty: the scenes'
+        initial states stand in.
+    """
 
     kit: Kit
     designs: tuple[DesignPieces, ...]
+    states: tuple[Mapping[str, State], ...] = ()
 
     @cached_property
     def labels(self) -> dict[str, tuple[str, ...]]:
@@ -100,6 +107,14 @@ class PartsList:
             kind: counts[rows].sum(axis=0) if together else counts[rows].max(axis=0, initial=0)
             for kind, counts in self.counts.items()
         }
+
+    def named(self, name: str) -> DesignPieces:
+        """The pieces of the design of that name. Raises InputError for a name that isn't there."""
+        return self.designs[self.row_of(name)]
+
+    def row_of(self, name: str) -> int:
+        """The design's place among the designs. Raises InputError for a name that isn't there."""
+        return self._rows([name])[0]
 
     def _rows(self, names: Iterable[str] | None) -> list[int]:
         known = [design.design.name for design in self.designs]
@@ -150,8 +165,17 @@ def parts_list(
 
 
 def parts_list_of(result: KitResult) -> PartsList:
-    """The pieces of a kit optimisation's final designs."""
-    return parts_list(result.kit, result.assignment, result.designs)
+    """The pieces of a kit optimisation's final designs, in the states that they are built in.
+
+    The input design's states stand in where no equilibrium of the assigned design was found.
+    """
+    parts = parts_list(result.kit, result.assignment, result.designs)
+    found = [
+        outcome if isinstance(outcome, Evaluation) else reference
+        for outcome, reference in zip(result.stages["assigned"].designs, result.references)
+    ]
+    states = tuple({role: eq.state for role, eq in each.equilibria.items()} for each in found)
+    return replace(parts, states=states)
 
 
 def _pieces(

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from ..scene.scene import Scene
+from ..scene.state import State
 from ..structures.base import Design
 from .pieces import DesignPieces, PartsList, Piece
 
@@ -83,8 +84,7 @@ class PlacedPieces:
         body = int(scene.node_body[np.flatnonzero(scene.node_hinge == hinge)[0]])
         sides: tuple[list[int], list[int]] = ([], [])
         for number in self.touching.get(body, []):
-            chain = scene.chains[number]
-            node = chain.nodes[0] if self.ends[number, 0] == body else chain.nodes[-1]
+            node = self.node_at(number, body)
             sides[int(scene.node_hinge[node] == hinge)].append(number)
         return Corner(body, hinge, tuple(sides[0]), tuple(sides[1]))
 
@@ -125,11 +125,49 @@ class PlacedPieces:
         joints = self.joints_of(piece)
         return joints[0] if len(joints) == 1 else None
 
+    def crossing_angles(self, state: State) -> dict[int, float]:
+        """Joint -> acute angle (rad) between the two rods that cross there; only where two do."""
+        tangents = self.scene.node_poses(state)[1][:, :, 0]
+        found = {}
+        for body, joint in self.joint_numbers.items():
+            nodes = [self.node_at(number, body) for number in self.touching.get(body, ())]
+            sides = {int(self.scene.node_hinge[node]): node for node in nodes}
+            if len(sides) == 2:
+                first, second = (tangents[node] for node in sides.values())
+                found[joint] = float(np.arccos(np.clip(abs(first @ second), 0.0, 1.0)))
+        return found
+
+    def node_at(self, chain: int, body: int) -> int:
+        """The node of a rod piece's end that lies on a body."""
+        nodes = self.scene.chains[chain].nodes
+        return int(nodes[0] if self.ends[chain, 0] == body else nodes[-1])
+
     def far_end(self, chain: int) -> int:
         """The body at that end of a rod piece which is not a joint of the design (the last one
         where none is)."""
         outer = [int(body) for body in self.ends[chain] if int(body) not in self.joint_numbers]
         return outer[-1] if outer else int(self.ends[chain, 1])
+
+
+def sharpest_crossings(parts: PartsList) -> dict[str, np.ndarray]:
+    """kind -> (m,) smallest angle (rad) at which a piece of each part crosses another, in any
+    state.
+
+    Right angles where a part crosses nothing.
+    """
+    found = {kind: np.full(m, np.pi / 2) for kind, m in parts.kit.sizes.items()}
+    for number, pieces in enumerate(parts.designs):
+        roles = pieces.design.roles
+        initial = {role.name: pieces.design.scene(role.name).initial for role in roles}
+        for role, state in (parts.states[number] if parts.states else initial).items():
+            placed = PlacedPieces.of(pieces, role)
+            angles = placed.crossing_angles(state)
+            for piece in pieces.pieces:
+                joint = placed.joint_of(piece)
+                if joint is not None and joint in angles:
+                    low = found[piece.kind]
+                    low[piece.part] = min(low[piece.part], angles[joint])
+    return found
 
 
 def bars_needed(parts: PartsList, kind: str) -> np.ndarray:

@@ -9,14 +9,9 @@ import pytest
 
 from kop_exudyn.errors import InputError
 from kop_exudyn.fabrication.assembly import assembly_plan, write_assembly_plan
-from kop_exudyn.fabrication.cutlist import (
-    Tolerances,
-    bill_of_pieces,
-    cut_list,
-    millimetres,
-    write_bill,
-    write_cut_list,
-)
+from kop_exudyn.fabrication.blanks import Blanks
+from kop_exudyn.fabrication.cutlist import bill_of_pieces, cut_list, write_bill, write_cut_list
+from kop_exudyn.fabrication.options import Tolerances, millimetres
 from kop_exudyn.fabrication.pieces import parts_list
 from kop_exudyn.kit.cluster import cluster
 from kop_exudyn.structures.base import design_from_dict
@@ -28,19 +23,21 @@ def read(path):
 
 
 def test_cut_list_has_every_part_with_its_dimensions(parts, tmp_path):
-    rows = read(write_cut_list(tmp_path / "cut.csv", parts, "m", Tolerances(0.25, 0.1)))
+    rows = read(write_cut_list(tmp_path / "cut.csv", Blanks(parts, "m"), Tolerances(0.25, 0.1)))
     assert [row["part"] for row in rows] == ["A1", "A2", "L1", "L2", "L3"]
     for row, angle in zip(rows[:2], parts.kit["angular"][:, 0]):
         assert float(row["angle_deg"]) == pytest.approx(np.degrees(angle), abs=1e-4)
         assert row["tolerance_deg"] == "0.1" and row["l1_mm"] == ""
     for row, (l1, l2) in zip(rows[2:], parts.kit["linear"]):
-        assert float(row["l1_mm"]) == pytest.approx(1000 * l1, abs=1e-4)
-        assert float(row["length_mm"]) == pytest.approx(1000 * (l1 + l2), abs=2e-4)
-        assert row["joint_at_mm"] == row["l1_mm"] and row["tolerance_mm"] == "0.25"
+        assert float(row["l1_mm"]) == pytest.approx(1000 * l1, abs=1e-3)
+        back = float(row["setback_mm"])
+        assert back > 1.0 and row["tolerance_mm"] == "0.25"
+        assert float(row["cut_length_mm"]) == pytest.approx(1000 * (l1 + l2) - 2 * back, abs=2e-3)
+        assert float(row["hole_from_end_mm"]) == pytest.approx(1000 * l1 - back, abs=2e-3)
 
 
 def test_pieces_are_those_of_the_neediest_design(parts, clustering):
-    rows = cut_list(parts, "m")
+    rows = cut_list(Blanks(parts, "m"))
     for row in rows:
         assert row["pieces"] == max(row["in_first"], row["in_second"])
     assert sum(row["in_first"] for row in rows) == parts.designs[0].design.n_elements
@@ -142,7 +139,7 @@ def test_umbrella_cells_are_sets_of_bars():
     )
     found = cluster(design.groups, design.parameters, {"cell": 2})
     parts = parts_list(found.kit, found.assignment, [design])
-    rows = cut_list(parts, "mm")
+    rows = cut_list(Blanks(parts, "mm"))
     assert [row["part"] for row in rows] == ["C1", "C2"]
     by_length = {row["top_mm"]: row for row in rows}
     assert (

@@ -2,18 +2,24 @@
 
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
+from dataclasses import replace
 
 import ezdxf
 import numpy as np
 import pytest
 
 from kop_exudyn.errors import InputError
+from kop_exudyn.fabrication.blanks import Blanks
+from kop_exudyn.fabrication.cutlist import cut_list
 from kop_exudyn.fabrication.cutsheets import cut_sheets, template_sheets
 from kop_exudyn.fabrication.dxf import write_dxf
+from kop_exudyn.fabrication.options import CutOptions
 from kop_exudyn.fabrication.pieces import parts_list
+from kop_exudyn.fabrication.placement import PlacedPieces
 from kop_exudyn.fabrication.svg import write_svg
-from kop_exudyn.fabrication.templates import CutOptions, templates
+from kop_exudyn.fabrication.templates import templates
 from kop_exudyn.kit.cluster import cluster
+from kop_exudyn.kit.parts import Kit
 from kop_exudyn.structures.base import design_from_dict
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -25,7 +31,7 @@ def documents(parts, tmp_path_factory):
     folder = tmp_path_factory.mktemp("sheets")
     return [
         ezdxf.readfile(write_dxf(folder / f"{n}.dxf", sheet))
-        for n, sheet in enumerate(cut_sheets(parts, "m"))
+        for n, sheet in enumerate(cut_sheets(Blanks(parts, "m")))
     ]
 
 
@@ -73,31 +79,26 @@ def test_every_piece_is_there_as_often_as_needed(parts, documents):
     assert found == needed
 
 
-def test_strips_measured(parts, documents):
-    """Joint holes are where the kit says, from the marked axis's ends; side 1 is marked on its
-    side."""
-    lengths = {
-        label: 1000 * values for label, values in zip(parts.labels["linear"], parts.kit["linear"])
-    }
+def test_sheets_are_what_the_cut_list_says(parts, documents):
+    """Every strip, measured: its length, its joint's and its bolts' places from the end of
+    side 1."""
+    rows = {row["part"]: row for row in cut_list(Blanks(parts, "m"))}
     measured = 0
     for document in documents:
         space = document.modelspace()
-        axes = [np.array(p.get_points("xy")) for p in space.query('LWPOLYLINE[layer=="ENGRAVE"]')]
         for outline in outlines(space):
             texts = labels_in(space, outline)
             if "1" not in texts:
                 continue
-            l1, l2 = lengths[next(t for t in texts if t != "1")]
-            assert np.ptp(outline[:, 1]) == pytest.approx(30.0)
-            middle = outline.mean(axis=0)
-            axis = next(a for a in axes if np.allclose(a.mean(axis=0), middle, atol=1e-6))
+            row = rows[next(t for t in texts if t != "1")]
+            low, high = outline.min(axis=0), outline.max(axis=0)
+            assert np.round(high - low, 3).tolist() == [row["cut_length_mm"], 30.0]
             holes = holes_in(space, outline)
             joint = holes[np.isclose(holes[:, 2], 4.0)]
-            assert len(joint) == 1 and len(holes) == 5
-            ends = np.sort(axis[:, 0])
-            assert joint[0, 0] - ends[0] == pytest.approx(l1, abs=1e-6)
-            assert ends[1] - joint[0, 0] == pytest.approx(l2, abs=1e-6)
-            assert joint[0, 1] == pytest.approx(middle[1])
+            assert np.round(joint[:, 0] - low[0], 3).tolist() == [row["hole_from_end_mm"]]
+            assert joint[0, 1] == pytest.approx((low[1] + high[1]) / 2)
+            bolts = np.sort(holes[np.isclose(holes[:, 2], row["bolt_hole_mm"]), 0]) - low[0]
+            assert " ".join(f"{x:.3f}" for x in bolts) == row["bolts_from_end_mm"]
             measured += 1
     assert measured == parts.needed()["linear"].sum()
 
@@ -105,7 +106,7 @@ def test_strips_measured(parts, documents):
 def test_corner_plates_measured(parts, documents):
     """The angle between the bolts of both legs is the part's; bolts fit those of the strips."""
     angles = dict(zip(parts.labels["angular"], parts.kit["angular"][:, 0]))
-    strip = next(t for t in templates(parts, "m") if t.label == "L1")
+    strip = next(t for t in templates(Blanks(parts, "m")) if t.label == "L1")
     bolts = np.sort([s.centre[0] for s in strip.shapes if getattr(s, "diameter", None) == 3.0])[:2]
     measured = 0
     for document in documents:
@@ -123,15 +124,19 @@ def test_corner_plates_measured(parts, documents):
     assert measured == parts.needed()["angular"].sum()
 
 
-def test_strips_do_not_overlap_at_the_sharpest_corner(parts):
-    strip = next(t for t in templates(parts, "m") if t.label == "L1")
-    setback = strip.shapes[0].points[:, 0].min()
-    sharpest = parts.kit["angular"].max()
-    assert setback == pytest.approx(15 * np.tan(sharpest / 2))
+def test_strips_at_the_sharpest_corner_touch_but_do_not_overlap(parts):
+    """Their inner corners meet: mitred ends would be as long as the axes, square ones are set
+    back."""
+    strip = next(s for s in Blanks(parts, "m").strips if s.label == "L1")
+    angle = parts.kit["angular"].max()
+    along = np.array([np.cos(angle), np.sin(angle)])
+    across = np.array([-np.sin(angle), np.cos(angle)])
+    before, after = [-strip.setback, 15.0], strip.setback * along + 15.0 * across
+    np.testing.assert_allclose(before, after, atol=1e-9)
 
 
 def test_pieces_keep_their_distance(parts):
-    for sheet in cut_sheets(parts, "m"):
+    for sheet in cut_sheets(Blanks(parts, "m")):
         boxes = np.array([s.box for s in sheet.shapes if s.layer == "CUT" and hasattr(s, "points")])
         low, high = boxes[:, 0], boxes[:, 1]
         apart = ((low[:, None] > high[None] + 4.9) | (low[None] > high[:, None] + 4.9)).any(axis=2)
@@ -140,7 +145,7 @@ def test_pieces_keep_their_distance(parts):
 
 
 def test_svg_agrees_with_dxf(parts, documents, tmp_path):
-    for n, (sheet, document) in enumerate(zip(cut_sheets(parts, "m"), documents)):
+    for n, (sheet, document) in enumerate(zip(cut_sheets(Blanks(parts, "m")), documents)):
         root = ElementTree.parse(write_svg(tmp_path / f"{n}.svg", sheet)).getroot()
         assert root.get("width") == "1000mm" and root.get("height") == "600mm"
         assert root.get("viewBox") == "0 0 1000 600"  # so one unit is a millimetre
@@ -159,13 +164,25 @@ def test_svg_agrees_with_dxf(parts, documents, tmp_path):
 def test_sheets_say_thickness_and_scale(documents):
     for document in documents:
         notes = [t.dxf.text for t in document.modelspace().query('TEXT[layer=="NOTES"]')]
-        assert any("thickness 4 mm" in note for note in notes)
+        assert any("4 mm thick" in note for note in notes)
         bar = [p for p in document.modelspace().query('LWPOLYLINE[layer=="NOTES"]') if not p.closed]
         assert np.ptp(np.array(bar[0].get_points("xy"))[:, 0]) == pytest.approx(100.0)
 
 
+def test_the_scale_bar_keeps_off_its_caption(parts):
+    for size in ((1000.0, 600.0), (950.0, 200.0)):
+        for sheet in cut_sheets(Blanks(parts, "m", CutOptions(sheet=size))):
+            notes = [
+                s for s in sheet.shapes if s.layer == "NOTES" and not getattr(s, "closed", False)
+            ]
+            caption = next(s for s in notes if hasattr(s, "text"))
+            bars = [s for s in notes if not hasattr(s, "text")]
+            assert max(bar.box[1, 1] for bar in bars) < caption.box[0, 1]
+            assert caption.box[1, 0] < size[0]
+
+
 def test_templates_have_one_of_each_with_its_dimensions(parts):
-    (sheet,) = template_sheets(parts, "m")
+    (sheet,) = template_sheets(Blanks(parts, "m"))
     assert sheet.labels == {
         label: 1
         for kind, counts in parts.needed().items()
@@ -173,12 +190,12 @@ def test_templates_have_one_of_each_with_its_dimensions(parts):
         if n
     }
     texts = " ".join(s.text for s in sheet.shapes if hasattr(s, "text"))
-    assert f"l1 {1000 * parts.kit['linear'][0, 0]:.2f}" in texts
+    assert f"{Blanks(parts, 'm').strips[0].cut_length:.1f} long" in texts
     assert f"{np.degrees(parts.kit['angular'][0, 0]):.2f} deg" in texts
 
 
 def test_the_same_kit_gives_the_same_bytes(parts, tmp_path):
-    sheet = cut_sheets(parts, "m")[0]
+    sheet = cut_sheets(Blanks(parts, "m"))[0]
     assert (
         write_dxf(tmp_path / "a.dxf", sheet).read_bytes()
         == write_dxf(tmp_path / "b.dxf", sheet).read_bytes()
@@ -187,17 +204,28 @@ def test_the_same_kit_gives_the_same_bytes(parts, tmp_path):
 
 def test_pieces_larger_than_a_sheet_are_refused(parts):
     with pytest.raises(InputError, match="larger than a sheet"):
-        cut_sheets(parts, "m", CutOptions(sheet=(200.0, 600.0)))
+        cut_sheets(Blanks(parts, "m", CutOptions(sheet=(200.0, 600.0))))
 
 
-def test_corners_without_room_are_refused_but_strips_can_be_had_alone(parts):
-    with pytest.raises(InputError, match="no room for plates"):
-        cut_sheets(parts, "m", CutOptions(bolt_hole=40.0))
-    alone = templates(parts, "m", CutOptions(bolt_hole=40.0, corners=False))
-    assert {t.label[0] for t in alone} == {"L"}
-    assert np.ptp(alone[0].shapes[0].points[:, 0]) == pytest.approx(
-        1000 * parts.kit["linear"][0].sum()
-    )
+def test_holes_without_room_are_named_but_strips_can_be_had_alone(parts):
+    wide = Blanks(parts, "m", CutOptions(bolt_hole=12.0))
+    assert any("bolt holes of 12 mm are too wide" in problem for problem in wide.problems)
+    broad = Blanks(parts, "m", CutOptions(bolt_hole=9.0, joint_hole=11.0))
+    assert any("joint hole of 11 mm" in problem for problem in broad.problems)
+    with pytest.raises(InputError, match="joint hole"):
+        broad.check()
+    alone = Blanks(parts, "m", CutOptions(bolt_hole=12.0, corners=False))
+    assert not alone.problems and not alone.plates
+    assert alone.strips[0].cut_length == pytest.approx(1000 * parts.kit["linear"][0].sum())
+
+
+def test_sides_too_short_for_their_holes_are_named(parts):
+    linear = parts.kit["linear"].copy()
+    linear[1, 0] = 0.014
+    short = replace(parts, kit=Kit({**parts.kit.parts, "linear": linear}))
+    (problem,) = Blanks(short, "m").problems
+    assert problem.startswith("part L2: its shorter side of 14.0 mm is too short for its holes")
+    assert not Blanks(parts, "m").problems
 
 
 @pytest.mark.parametrize("options", [{"gap": -1}, {"sheet": (0, 10)}, {"joint_hole": np.nan}])
@@ -220,15 +248,30 @@ def test_lamellas_on_edge_get_slots():
         }
     )
     found = cluster(design.groups, design.parameters, {"linear": 2, "angular": 1})
-    strips = [
-        t
-        for t in templates(parts_list(found.kit, found.assignment, [design]), "m")
-        if t.label[0] == "L"
-    ]
-    for strip, (l1, _) in zip(strips, found.kit["linear"]):
-        slot = strip.shapes[0].points[3:7]
-        assert strip.thickness == pytest.approx(4.0)
-        assert slot[:, 0].mean() == pytest.approx(1000 * l1)
-        assert np.ptp(slot[:, 0]) == pytest.approx(4.2) and np.ptp(slot[:, 1]) == pytest.approx(
-            15.0
-        )
+    parts = parts_list(found.kit, found.assignment, [design])
+    blanks = Blanks(parts, "m")
+    placed = PlacedPieces.of(parts.designs[0])
+    angles = placed.crossing_angles(placed.scene.initial)
+    sharpest = dict.fromkeys(parts.labels["linear"], np.pi / 2)
+    for piece in parts.designs[0].pieces:
+        if piece.kind == "linear":
+            label = parts.label(piece)
+            sharpest[label] = min(sharpest[label], angles[placed.joint_of(piece)])
+    assert min(sharpest.values()) < np.radians(88)
+    for template in templates(blanks):
+        if template.label not in sharpest:
+            continue
+        strip = next(s for s in blanks.strips if s.label == template.label)
+        slot = template.shapes[0].points[3:7]
+        assert template.thickness == pytest.approx(4.0)
+        assert slot[:, 0].mean() == pytest.approx(strip.hole_from_end)
+        assert np.ptp(slot[:, 1]) == pytest.approx(15.0)
+        # a lamella of 4 mm passes through a board of 4 mm, turned by the angle, with 0.1 mm to
+        # spare on either side: the outermost of its corners touch the slot's walls
+        phi = sharpest[template.label]
+        on_faces = [
+            (2.0 * face * np.cos(phi) - 2.0 * side) / np.sin(phi)
+            for side in (-1, 1)
+            for face in (-1, 1)
+        ]
+        assert np.ptp(slot[:, 0]) == pytest.approx(np.ptp(on_faces) + 0.2)

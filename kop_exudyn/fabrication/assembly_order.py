@@ -1,0 +1,101 @@
+"""In which order a design is put together, and what holds it together: steps and fasteners."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .assembly import stands_on_edge
+from .blanks import Blanks
+from .lamellas import LOWER, UPPER, Lamella, Lamellas
+from .pieces import DesignPieces
+from .placement import PlacedPieces
+
+_SPARE = 1.0  # diameters of a bolt's shank beyond what it holds: nut and washers
+_BOLTS_A_CORNER = 4
+
+
+def assembly_steps(blanks: Blanks, name: str) -> list[dict[str, Any]]:
+    """One row a step, in order: what to do, with which lamella, elements and joints.
+
+    First every lamella is bolted together on a bench, then all lower ones are laid out, then the
+    upper ones put on them, joint by joint. Where the two don't separate into families, lamellas
+    come in the order of their numbers, each with the joints whose other lamella is there already.
+    A design of several states is assembled in the first and opened into the last. Nothing for
+    parts that aren't lamellas.
+
+    Raises InputError for a design that isn't there.
+    """
+    pieces = blanks.parts.named(name)
+    lamellas = Lamellas(PlacedPieces.of(pieces))
+    if not lamellas.all:
+        return []
+    parts = blanks.parts
+    steps: list[dict[str, Any]] = []
+    for lamella in lamellas.all:
+        labels = " ".join(parts.label(piece) for piece in lamella.pieces)
+        steps.append(_step("bolt together", lamella, parts=labels))
+    there: set[int] = set()
+    for lamella in _in_order(lamellas):
+        joints = [
+            joint
+            for joint, pair in sorted(lamellas.crossings.items())
+            if {lamellas.place[piece.element][0] for piece in pair} <= there | {lamella.number}
+            and lamella.number in {lamellas.place[piece.element][0] for piece in pair}
+        ]
+        there.add(lamella.number)
+        action = "put on, and join" if joints else "lay out"
+        steps.append(_step(action, lamella, joints=" ".join(map(str, joints)) or None))
+    roles = pieces.design.roles
+    if len(roles) > 1:
+        steps.append({"action": f"open from the {roles[-1].name} to the {roles[0].name} state"})
+    return [{"step": number} | step for number, step in enumerate(steps, 1)]
+
+
+def fasteners(blanks: Blanks) -> list[dict[str, Any]]:
+    """One row a sort of fastener: what it is for, diameter, clamped thickness, length, pieces.
+
+    As many as the design with most of them needs, and for every design.
+    """
+    board, options = blanks.board, blanks.options
+    counts = {design.design.name: _counted(design, blanks) for design in blanks.parts.designs}
+    rows = []
+    clamped = 2 * board.thickness
+    for item, diameter in (("joint", options.joint_hole), ("corner", options.bolt_hole)):
+        numbers = {name: found[item] for name, found in counts.items()}
+        if any(numbers.values()):
+            row = {
+                "item": f"bolt with nut, {item}s",
+                "diameter_mm": diameter,
+                "clamps_mm": clamped,
+                "length_mm": round(clamped + 2 * _SPARE * diameter, 1),
+                "pieces": max(numbers.values()),
+            }
+            rows.append(row | {f"in_{name}": number for name, number in numbers.items()})
+    return rows
+
+
+def _counted(design: DesignPieces, blanks: Blanks) -> dict[str, int]:
+    """Bolts of one design, by what they are for; lamellas in slots need none at their joints."""
+    placed = PlacedPieces.of(design)
+    joints = 0 if stands_on_edge(placed) else len(Lamellas(placed).crossings)
+    corners = sum(corner in placed.corners for corner in placed.pieces.by_parameter)
+    return {"joint": joints, "corner": _BOLTS_A_CORNER * corners if blanks.corners.bolts else 0}
+
+
+def _step(action: str, lamella: Lamella, **more: Any) -> dict[str, Any]:
+    elements = " ".join(str(piece.element) for piece in lamella.straight)
+    return {"action": action, "lamella": lamella.number, "elements": elements} | more
+
+
+def _in_order(lamellas: Lamellas) -> list[Lamella]:
+    """The lower family first, then the upper one; in the order of their numbers within them."""
+    if not lamellas.by_family:
+        return list(lamellas.all)
+    layers = {
+        lamella.number: next(
+            (lamellas.layer[p.element] for p in lamella.straight if p.element in lamellas.layer),
+            LOWER,
+        )
+        for lamella in lamellas.all
+    }
+    return sorted(lamellas.all, key=lambda lamella: layers[lamella.number] == UPPER)

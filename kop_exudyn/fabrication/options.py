@@ -1,0 +1,81 @@
+"""What a workshop has and asks for: units, tolerances, and the sizes of sheets, bars, holes and
+gaps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+
+# Millimetres of one unit of length.
+UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
+
+
+def millimetres(unit: str) -> float:
+    """Millimetres of one unit of length; InputError for a unit that isn't known."""
+    if unit not in UNITS:
+        raise InputError(
+            f"unknown unit of length (known: {', '.join(UNITS)})", field="unit", value=unit
+        )
+    return UNITS[unit]
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """What the workshop should keep to: length in mm, angle in degrees."""
+
+    length: float = 0.5
+    angle: float = 0.5
+
+    def __post_init__(self) -> None:
+        for name in ("length", "angle"):
+            if not 0 < getattr(self, name) < np.inf:
+                raise InputError(
+                    "must be positive", field=f"tolerance.{name}", value=getattr(self, name)
+                )
+
+
+@dataclass(frozen=True)
+class CutOptions:
+    """Sizes in mm.
+
+    sheet : width and height of a sheet
+    stock : lengths of the bars that straight pieces are sawn from; none: no plan for bars
+    gap : between pieces on a sheet
+    margin : to a sheet's edge
+    kerf : width of a cut, lost between two pieces of a bar; on sheets, pieces keep at least that
+        much apart. Outlines are the finished edges: the machine puts its tool beside them.
+    joint_hole, bolt_hole : diameters
+    clearance : by which slots are wider than what goes through them
+    corners : whether strips are prepared for corner plates
+    """
+
+    sheet: tuple[float, float] = (1000.0, 600.0)
+    stock: tuple[float, ...] = (2400.0, 4800.0)
+    gap: float = 5.0
+    margin: float = 15.0
+    kerf: float = 3.0
+    joint_hole: float = 4.0
+    bolt_hole: float = 3.0
+    clearance: float = 0.2
+    corners: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ("gap", "margin", "kerf", "joint_hole", "bolt_hole", "clearance"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise InputError(
+                    "must not be negative", field=f"options.{name}", value=getattr(self, name)
+                )
+        if not all(0 < side < np.inf for side in self.sheet):
+            raise InputError(
+                "a sheet has a positive width and height", field="options.sheet", value=self.sheet
+            )
+        if not all(0 < length < np.inf for length in self.stock):
+            raise InputError("a bar has a positive length", field="options.stock", value=self.stock)
+
+    @property
+    def apart(self) -> float:
+        """What pieces on a sheet keep between each other."""
+        return max(self.gap, self.kerf)
