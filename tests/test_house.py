@@ -7,6 +7,7 @@ from pathlib import Path
 FOLDERS = (
     "errors",
     "plugins",
+    "units",
     "geometry",
     "sqp",
     "files",

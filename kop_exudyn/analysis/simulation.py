@@ -74,6 +74,7 @@ class SimulationResult:
         final = self.deployed
         return {
             "design": self.design.name,
+            "units": None if self.design.units is None else self.design.units.to_dict(),
             "unknowns": self.unknowns,
             "elements": self.elements,
             "newton_iterations": self.newton_iterations,

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .output import add_json, report
 from .values import number_pair, positive_number
+
+if TYPE_CHECKING:
+    from ..units import Units
 
 HELP = "write cut lists, cut sheets, assembly plans and 3D files of a finished kit"
 DESCRIPTION = """Reads the folder that `kop optimize` wrote, and writes two folders: workshop (cut
@@ -15,9 +19,9 @@ corner templates at true scale as SVG, and DXF with the extra [fab]) and desk (t
 states as OBJ centre lines, PLY and GLB solids, VTU with strains, stresses and utilisation, and
 tables as CSV)."""
 EXAMPLES = """examples:
-  kop export out/kit models/conformals --out out/files --unit m
-  kop export out/kit study.toml --out out/files --unit m --sheet 2500,1250 --joint-hole 6
-  kop export out/kit models/conformals --out out/files --unit m --only desk"""
+  kop export out/kit models/conformals --out out/files
+  kop export out/kit study.toml --out out/files --sheet 2500,1250 --joint-hole 6
+  kop export out/kit designs --out out/files --unit mm --only workshop"""
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +34,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write to")
     parser.add_argument(
-        "--unit", required=True, choices=("mm", "cm", "m"), help="the designs' unit of length"
+        "--unit",
+        choices=("mm", "cm", "m", "in", "ft"),
+        help="the designs' unit of length, where their files don't name it",
     )
     parser.add_argument(
         "--only", choices=("workshop", "desk"), help="write one of the folders (default: both)"
@@ -70,13 +76,14 @@ def run(args: argparse.Namespace) -> int:
     given = {name: getattr(args, name) for name in ("sheet", "joint_hole", "bolt_hole")}
     options = CutOptions(**{name: value for name, value in given.items() if value is not None})
     result = load_run(args.result, load_designs(args.folder))
+    unit = _unit(args, result.units)
     done: list[Path] = []
     if args.only != "desk":
         sheets = ["svg"] + (["dxf"] if find_spec("ezdxf") else [])
         done += export_workshop(
             parts_list_of(result),
             args.out / "workshop",
-            args.unit,
+            unit,
             options=options,
             formats=sheets,
             overwrite=args.overwrite,
@@ -86,3 +93,24 @@ def run(args: argparse.Namespace) -> int:
         done += export_desk(result, args.out / "desk", overwrite=args.overwrite)
     report(args, {"folder": args.out, "files": done}, f"{len(done)} files in {args.out}\n")
     return 0
+
+
+def _unit(args: argparse.Namespace, units: Units | None) -> str:
+    """The designs' unit of length: their files', or the one that is given."""
+    from ..errors import InputError
+
+    if units is None and args.unit is None:
+        raise InputError(
+            'the designs name no units: give --unit, or add "units": {"length": "m"} to their '
+            "files",
+            source=args.folder,
+            field="--unit",
+        )
+    if units is not None and args.unit not in (None, units.length):
+        raise InputError(
+            f"the designs are in {units.length}",
+            source=args.folder,
+            field="--unit",
+            value=args.unit,
+        )
+    return units.length if units is not None else args.unit

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .output import add_json
 from .values import gravity
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from ..structures.base import Design
+    from ..units import Units
 
 HELP = "deploy one design and say how well it fits its target"
 DESCRIPTION = """Deploys a design, has Exudyn confirm the equilibrium, and reports its energy, its
@@ -28,11 +36,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--gravity",
         nargs="?",
         type=gravity,
-        const=gravity("9.81"),
+        const=(),
         metavar="G",
-        help="let the rods' weight act: an acceleration down the z axis (default: 9.81, for "
-        "lengths in metres) or a vector X,Y,Z, in the design's units; instead of the design "
-        "file's gravity. Materials need a density",
+        help="let the rods' weight act: an acceleration down the z axis (default: standard "
+        "gravity, where the design names its units) or a vector X,Y,Z, in the design's units; "
+        "instead of the design file's gravity. Materials need a density",
     )
     add_json(
         parser,
@@ -44,27 +52,47 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from dataclasses import replace
 
-    import numpy as np
-
     from ..analysis.simulation import simulate
     from ..errors import SimulationFailure
     from ..files.json_files import to_json
     from ..io.designs import load_design
 
     design = load_design(args.design)
-    own = () if args.gravity is None else (replace(design.loads, gravity=np.array(args.gravity)),)
+    own = ()
+    if args.gravity is not None:
+        own = (replace(design.loads, gravity=_gravity(design, args)),)
     try:
         result = simulate(design, *own).to_dict()
     except SimulationFailure as failure:
         if args.json:
             sys.stdout.write(to_json({"design": design.name, "failed": str(failure)}))
         raise
-    sys.stdout.write(to_json(result) if args.json else _summary(result))
+    sys.stdout.write(to_json(result) if args.json else _summary(result, design.units))
     return 0
 
 
-def _summary(result: dict) -> str:
+def _gravity(design: Design, args: argparse.Namespace) -> np.ndarray:
+    """(3,) the acceleration asked for, in the design's units."""
+    import numpy as np
+
+    from ..errors import InputError
+
+    if args.gravity:
+        return np.array(args.gravity)
+    if design.units is None:
+        raise InputError(
+            "the design names no units: say how much, as --gravity 9.81 for metres or --gravity "
+            ' 9810 for millimetres, or add "units": {"length": "m", "force": "N"} to its file',
+            source=args.design,
+            field="--gravity",
+        )
+    return np.array([0.0, 0.0, -design.units.gravity])
+
+
+def _summary(result: dict, units: Units | None) -> str:
     """The result in a few lines."""
+    from ..units import with_unit
+
     exudyn, fit = result["exudyn"], result["fit"]
     rows = {
         "design": result["design"],
@@ -72,37 +100,45 @@ def _summary(result: dict) -> str:
         "deviation": f"max {fit['max_percent']:.3g} %, mean {fit['mean_percent']:.3g} % "
         "of the target's box diagonal",
         "displacement": f"max {result['displaced_percent']:.3g} % from the joints' own places",
-        "elastic energy": f"{result['elastic_energy']:.6g}",
+        "elastic energy": with_unit(result["elastic_energy"], "energy", units, 6),
         "stable": "yes" if result["stable"] else "no",
         "solved in": f"{result['wall_s']:.2f} s, {result['newton_iterations']} Newton iterations",
         "Exudyn": f"{exudyn['version']}: {exudyn['newton_steps']} steps, "
         f"moved by {exudyn['moved']:.1e} of its size",
     }
     if result["opening_angle"] is not None:
-        rows["opening angle"] = f"{result['opening_angle']:.4g} rad"
-    rows |= {f"stress, {role}": _stress(strength) for role, strength in result["strength"].items()}
+        angle = result["opening_angle"]
+        rows["opening angle"] = f"{angle:.4g} rad, {math.degrees(angle):.4g}°"
+    rows |= {
+        f"stress, {role}": _stress(strength, units) for role, strength in result["strength"].items()
+    }
     if "loaded" in result:
-        rows |= _under_load(result["loaded"])
+        rows |= _under_load(result["loaded"], units)
     width = max(15, *map(len, rows))
     return "".join(f"{name:<{width}} {value}\n" for name, value in rows.items())
 
 
-def _under_load(loaded: dict) -> dict[str, str]:
+def _under_load(loaded: dict, units: Units | None) -> dict[str, str]:
     """Rows about the loaded state."""
+    from ..units import unit_of, with_unit
+
     deflection = loaded["deflection"]
     force = ", ".join(f"{component:.4g}" for component in loaded["total_force"])
+    force = f"({force}) {unit_of('force', units)}"
+    largest, mean = (with_unit(deflection[name], "length", units, 3) for name in ("max", "mean"))
     return {
-        "load": f"({force}) in all, held at {len(loaded['supports'])} joints",
-        "deflection": f"max {deflection['max']:.3g} "
-        f"({deflection['max_percent']:.3g} % of the diagonal), "
-        f"mean {deflection['mean']:.3g} ({deflection['mean_percent']:.3g} %)",
-        "stress, loaded": _stress(loaded["strength"]),
+        "load": f"{force} in all, held at {len(loaded['supports'])} joints",
+        "deflection": f"max {largest} ({deflection['max_percent']:.3g} % of the diagonal), "
+        f"mean {mean} ({deflection['mean_percent']:.3g} %)",
+        "stress, loaded": _stress(loaded["strength"], units),
         "stable, loaded": "yes" if loaded["stable"] else "no",
     }
 
 
-def _stress(strength: dict) -> str:
+def _stress(strength: dict, units: Units | None) -> str:
     """The largest equivalent stress, and what it is of the elastic limit."""
+    from ..units import with_unit
+
     if strength["equivalent_stress"] is None:
         return "unknown: the rods have no section"
     share = strength["utilisation"]
@@ -111,4 +147,4 @@ def _stress(strength: dict) -> str:
         if share is None
         else f", {100 * share:.3g} % of the elastic limit{': it yields' if share > 1 else ''}"
     )
-    return f"{strength['equivalent_stress']:.4g}{used}"
+    return with_unit(strength["equivalent_stress"], "stress", units) + used

@@ -144,9 +144,10 @@ def _write_state(
         elif suffix == "ply":
             done.append(write_ply(target, swept(), colours[swept().chains], overwrite=overwrite))
         elif suffix == "glb":
-            done.append(
-                write_glb(target, _solids(parts, placed, swept(), colours), overwrite=overwrite)
-            )
+            units = placed.design.units
+            solids = _solids(parts, placed, swept(), colours)
+            metres = 1.0 if units is None else units.metres
+            done.append(write_glb(target, solids, metres, overwrite=overwrite))
         elif suffix == "vtu":
             fields = element_fields(
                 scene, equilibrium, rod_strength(scene, equilibrium, materials_of(placed.design))

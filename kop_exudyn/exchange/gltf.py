@@ -34,9 +34,11 @@ class Solid:
     colours: np.ndarray
 
 
-def glb_bytes(solids: Sequence[Solid]) -> bytes:
+def glb_bytes(solids: Sequence[Solid], metres: float = 1.0) -> bytes:
     """The solids as a GLB file, one node each; z is up here, and told so to the reader by the
-    root's matrix.
+    root's matrix, as are the metres that glTF wants.
+
+    metres : of one unit of the vertices
 
     Vertices are single precision; normals are left to the reader, which makes every face flat, as
     cut boards are.
@@ -46,7 +48,7 @@ def glb_bytes(solids: Sequence[Solid]) -> bytes:
     nodes: list[dict[str, Any]] = [
         {"name": solid.name, "mesh": k} for k, solid in enumerate(solids)
     ]
-    nodes.append({"name": "z up", "matrix": _TO_Y_UP, "children": list(range(len(solids)))})
+    nodes.append({"name": "z up", "matrix": _root(metres), "children": list(range(len(solids)))})
     document = {
         "asset": {"version": "2.0", "generator": "kop_exudyn"},
         "scene": 0,
@@ -65,9 +67,16 @@ def glb_bytes(solids: Sequence[Solid]) -> bytes:
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
-def write_glb(path: str | Path, solids: Sequence[Solid], *, overwrite: bool = False) -> Path:
+def _root(metres: float) -> list[float]:
+    """The root's matrix, column by column."""
+    return [metres * value for value in _TO_Y_UP[:15]] + [1.0]
+
+
+def write_glb(
+    path: str | Path, solids: Sequence[Solid], metres: float = 1.0, *, overwrite: bool = False
+) -> Path:
     """Write solids. Raises InputError when the file exists or can't be written."""
-    return write_bytes(path, glb_bytes(solids), overwrite=overwrite)
+    return write_bytes(path, glb_bytes(solids, metres), overwrite=overwrite)
 
 
 class _Buffer:

@@ -24,7 +24,7 @@ def result_tables(result: KitResult) -> dict[str, Rows]:
     angles in radians.
 
     designs : one row a design and stage, the input and where the assigned design opens into
-        included: fit in % of the bounding box, energy, utilisation; or the failure
+        included: its units, fit in % of the bounding box, energy, utilisation; or the failure
     elements : one row an element: its part and variant, and its parameters as in the input and in
         every stage
     joints : one row a design, stage and joint: place and distance from the target
@@ -55,6 +55,7 @@ def _designs(result: KitResult) -> Iterator[dict[str, Any]]:
             "design": design.name,
             "class": design.class_name,
             "stage": INPUT,
+            **_units(result),
             "elements": design.n_elements,
             **result.input_summary(n)["fit"],
             **_states(result, n, result.references[n].equilibria),
@@ -64,6 +65,7 @@ def _designs(result: KitResult) -> Iterator[dict[str, Any]]:
             "design": design.name,
             "class": design.class_name,
             "stage": stage,
+            **_units(result),
             "elements": design.n_elements,
         }
         if not isinstance(outcome, Evaluation):
@@ -71,6 +73,15 @@ def _designs(result: KitResult) -> Iterator[dict[str, Any]]:
             continue
         row |= {"max_percent": outcome.fit.max_percent, "mean_percent": outcome.fit.mean_percent}
         yield row | _states(result, n, outcome.equilibria)
+
+
+def _units(result: KitResult) -> dict[str, str | None]:
+    """Units of lengths and forces in all tables; empty where no design names any."""
+    units = result.units
+    return {
+        "length_unit": None if units is None else units.length,
+        "force_unit": None if units is None else units.force,
+    }
 
 
 def _states(

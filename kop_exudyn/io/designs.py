@@ -15,6 +15,7 @@ from ..files.json_files import read_json
 from ..structures.base import Design, design_from_dict
 from ..structures.umbrella.design import Umbrella
 from ..structures.umbrella.release import is_release
+from ..units import common_units
 
 DESIGN_VERSION = 1
 _SUFFIXES = (".json", ".json.gz")
@@ -43,7 +44,8 @@ def load_design(path: str | Path) -> Design:
 
 
 def load_all(files: Iterable[Path], source: str | Path) -> list[Design]:
-    """The designs of these files; InputError, naming the source, when two have the same name."""
+    """The designs of these files; InputError, naming the source, when two have the same name or
+    different units."""
     designs = [load_design(path) for path in files]
     seen: dict[str, Design] = {}
     for design in designs:
@@ -52,6 +54,10 @@ def load_all(files: Iterable[Path], source: str | Path) -> list[Design]:
                 "two designs have the same name", source=source, field="name", value=design.name
             )
         seen[design.name] = design
+    try:
+        common_units({design.name: design.units for design in designs})
+    except InputError as error:
+        raise error.at(source) from None
     return designs
 
 

@@ -3,11 +3,14 @@ exists."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from ..files.documents import check_envelope, check_schema
 from ..files.json_files import read_json, write_json
 from ..kit.parts import Kit
+from ..units import units_from_dict
 
 KIT_VERSION = 1
 
@@ -17,11 +20,15 @@ def load_kit(path: str | Path) -> Kit:
     data = read_json(path)
     check_envelope(data, "kit", KIT_VERSION, source=path)
     check_schema(data, "kit", source=path)
-    return Kit.from_dict(data["parts"], source=str(path))
+    kit = Kit.from_dict(data["parts"], source=str(path))
+    return replace(kit, units=units_from_dict(data.get("units")))
 
 
 def save_kit(path: str | Path, kit: Kit, *, overwrite: bool = False) -> Path:
     """Write a kit, exactly: `load_kit` gives the same numbers. InputError when the file exists or
     can't be written."""
-    data = {"format": "kop_exudyn/kit", "version": KIT_VERSION, "parts": kit.to_dict()}
+    data: dict[str, Any] = {"format": "kop_exudyn/kit", "version": KIT_VERSION}
+    if kit.units is not None:
+        data["units"] = kit.units.to_dict()
+    data["parts"] = kit.to_dict()
     return write_json(path, data, overwrite=overwrite)

@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import InputError
+from ..units import Units
 from .groups import ElementGroup
 from .kinds import PartKind, Variants, part_kind
 
@@ -21,12 +22,14 @@ class Kit:
 
     parts : kind -> (m, k_p) parameters of its parts; lengths in the designs' unit, angles in
         radians
+    units : of the lengths, where they are known
 
     The kit as one vector p (n_p,): kinds in alphabetical order, within them part by part, parameter
     by parameter.
     """
 
     parts: Mapping[str, np.ndarray]
+    units: Units | None = None
 
     def __post_init__(self) -> None:
         checked = {name: _checked(part_kind(name), self.parts[name]) for name in sorted(self.parts)}
@@ -61,7 +64,8 @@ class Kit:
             {
                 name: p[start : start + self.parts[name].size].reshape(self.parts[name].shape)
                 for name, start in self.offsets.items()
-            }
+            },
+            self.units,
         )
 
     def bounds(self, bounds: Mapping[str, tuple] | None = None) -> tuple[np.ndarray, np.ndarray]:

@@ -100,7 +100,7 @@ class Projection:
             else:
                 parts[name], labels[name] = lloyd(e, kit[name], *e.kind.bounds(self.bounds))
         assignment = to_assignment(self.groups, len(q), elements, labels)
-        found = Kit({**kit.parts, **parts})
+        found = Kit({**kit.parts, **parts}, kit.units)
         return ProjectionMinimum(found, assignment, self.energy(q, found, assignment))
 
     def energy(self, q: np.ndarray, kit: Kit, assignment: Assignment) -> float:

@@ -13,6 +13,7 @@ from ..kit.kinds import part_kind
 from ..search.objective import Evaluation
 from ..search.result import INPUT, REDEPLOYED, STAGES, KitResult
 from ..structures.base import Design
+from ..units import unit_of
 from .designs import DrawnDesign, DrawnState
 from .history import History, HistoryStep
 from .parameters import ElementCloud, PartSpace
@@ -84,6 +85,7 @@ def part_spaces(result: KitResult) -> list[PartSpace]:
                 part_kind(name).parameter_names,
                 parts,
                 [_cloud(label, name, members, q) for label, q in clouds.items()],
+                "" if result.units is None else result.units.length,
             )
         )
     return spaces
@@ -119,7 +121,7 @@ def summary_rows(result: KitResult) -> tuple[list[str], list[list]]:
         *(f"{stage}, max %" for stage in (INPUT, *stages)),
         "assigned, mean %",
         "energy ratio",
-        "largest stress",
+        f"largest stress, {unit_of('stress', result.units)}",
         "utilisation",
         "stable",
     ]

@@ -8,7 +8,9 @@ from pathlib import Path
 from ..drawing.style import save_figure
 from ..io.kits import save_kit
 from ..io.results import save_result, save_states
+from ..kit.kinds import part_kind
 from ..search.result import KitResult
+from ..units import unit_of
 from .designs import draw_designs
 from .environment import environment
 from .history import draw_history
@@ -87,8 +89,9 @@ def _page(result: KitResult, figures: dict) -> Page:
     )
     for kind, parts in result.kit.to_dict().items():
         several = isinstance(parts[0], list)
+        unit = unit_of("angle" if part_kind(kind).angular else "length", result.units)
         page.details(
-            f"The {len(parts)} {kind} parts",
+            f"The {len(parts)} {kind} parts, {unit}",
             {str(k): part if several else [part] for k, part in enumerate(parts, 1)},
         )
     page.section(

@@ -26,6 +26,7 @@ from ..search.job import JobSettings, run_job
 from ..search.result import KitResult
 from ..search.stage_results import StageEvent
 from ..structures.base import Design
+from ..units import common_units
 from .kit_report import write_kit_report
 
 
@@ -54,7 +55,9 @@ def optimize_kit(
     and SimulationFailure when an input design can't be simulated.
     """
     begin = perf_counter()
+    units = common_units({design.name: design.units for design in designs})
     if kit is not None:
+        common_units({"the kit": kit.units, "the designs": units}, "designs and kits")
         _check_kit(designs, kit)
     else:
         _check_request(designs, parts, settings)

@@ -31,12 +31,18 @@ class ElementCloud:
 @dataclass(frozen=True)
 class PartSpace:
     """One kind: its parts (m, k), the elements of one or more stages (the earliest first), the
-    parameters' names."""
+    parameters' names, the unit of lengths."""
 
     kind: str
     parameter_names: Sequence[str]
     parts: np.ndarray
     clouds: Sequence[ElementCloud]
+    unit: str = ""
+
+    def axis(self, number: int) -> str:
+        """The name of a parameter with its unit."""
+        unit = "degrees" if self.kind == "angular" else self.unit
+        return ", ".join(filter(None, (self.parameter_names[number], unit)))
 
 
 def draw_parameters(spaces: Sequence[PartSpace]) -> Figure:
@@ -70,8 +76,8 @@ def _draw_plane(ax: Axes, space: PartSpace) -> None:
         xlim=(low, high),
         ylim=(low, high),
         aspect="equal",
-        xlabel=space.parameter_names[0],
-        ylabel=space.parameter_names[1],
+        xlabel=space.axis(0),
+        ylabel=space.axis(1),
     )
     ax.axline((low, low), slope=1, color=FAINT, linewidth=0.8, zorder=0.5)
     for cloud, colour in zip(space.clouds, _CLOUD_COLOURS):
@@ -140,8 +146,7 @@ def _draw_line(ax: Axes, space: PartSpace) -> None:
         )
     for number, place in zip(np.argsort(parts) + 1, _spread(np.sort(parts), 0.035 * np.ptp(edges))):
         ax.text(place, 1.06 * height, str(number), ha="center", va="bottom", size=7.5, color=_PART)
-    name = space.parameter_names[0]
-    ax.set(xlabel=f"{name}, degrees" if space.kind == "angular" else name, ylabel="elements")
+    ax.set(xlabel=space.axis(0), ylabel="elements")
     ax.grid(False, axis="x")
     ax.legend(
         loc="upper center",

@@ -23,6 +23,7 @@ from ..search.result import KitResult
 from ..structures.base import Design, Target
 from ..structures.fitting import Placement, TargetFitting
 from ..structures.strength import design_strength
+from ..units import Units
 from .clipping import clipped
 from .viewer import ViewerDesign, ViewerPart, ViewerRods, ViewerScene, ViewerState
 
@@ -80,7 +81,7 @@ def viewer_parts(parts: PartsList) -> list[ViewerPart]:
                     parts.labels[kind][k],
                     kind,
                     colour,
-                    _dimensions(part_kind(kind), values[k]),
+                    _dimensions(part_kind(kind), values[k], parts.kit.units),
                     parts.counts[kind][:, k].tolist(),
                 )
             )
@@ -260,7 +261,8 @@ def _ring_values(scene: Scene, values: np.ndarray) -> np.ndarray:
     return np.concatenate(list(found))
 
 
-def _dimensions(kind: PartKind, values: np.ndarray) -> str:
+def _dimensions(kind: PartKind, values: np.ndarray, units: Units | None) -> str:
     if kind.angular:
         return ", ".join(f"{np.degrees(v):.2f}°" for v in values)
-    return ", ".join(f"{name} = {v:.4g}" for name, v in zip(kind.parameter_names, values))
+    lengths = ", ".join(f"{name} = {v:.4g}" for name, v in zip(kind.parameter_names, values))
+    return lengths if units is None else f"{lengths} {units.length}"

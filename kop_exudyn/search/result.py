@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from ..kit.parts import Assignment, Kit
 from ..structures.base import Design
 from ..structures.fitting import TargetFitting
 from ..structures.strength import strength_summary
+from ..units import Units, common_units
 from .events import events_to_list
 from .objective import Evaluation, Reference
 from .stage_results import SAME_STATE, StageEvent, StageResult, distance
@@ -47,9 +48,14 @@ class KitResult:
     redeployed: Sequence[Evaluation | SimulationFailure] = ()
 
     @property
+    def units(self) -> Units | None:
+        """Of the designs and so of the kit; None where no design names any."""
+        return common_units({design.name: design.units for design in self.designs})
+
+    @property
     def kit(self) -> Kit:
-        """The kit that the run was for."""
-        return self.stages["assigned"].kit
+        """The kit that the run was for, in the designs' units."""
+        return replace(self.stages["assigned"].kit, units=self.units)
 
     @property
     def assignment(self) -> Assignment:
@@ -96,6 +102,7 @@ class KitResult:
     def to_dict(self) -> dict[str, Any]:
         """As result.json has it."""
         return {
+            "units": None if self.units is None else self.units.to_dict(),
             "designs": [
                 {
                     "name": design.name,

@@ -19,6 +19,7 @@ import numpy as np
 from ..errors import InputError
 from ..kit.groups import ElementGroup
 from ..plugins import load_folder
+from ..units import Units, units_from_dict
 from .loads import LoadCase, load_case_from_dict
 
 if TYPE_CHECKING:
@@ -81,6 +82,8 @@ class Design(ABC):
     free_scale: float = 1.0
     # What acts on the deployed design; the search for a kit is for the unloaded one.
     loads: LoadCase = LoadCase()
+    # Of all its numbers; None where its file names none.
+    units: Units | None = None
     name: str
     parameters: np.ndarray
     lower: np.ndarray
@@ -182,6 +185,8 @@ def design_from_dict(data: Mapping[str, Any], source: str = "design") -> Design:
             value=class_name,
         )
     design = _REGISTRY[class_name](data, source)
+    if "units" in data:
+        design.units = units_from_dict(data["units"])
     if "loads" in data or "supports" in data:
         design.loads = load_case_from_dict(data)
         design.loads.check(len(design.joints), source)

@@ -53,6 +53,7 @@ def design(name: str, image: Map, opening: float) -> dict:
         "version": 1,
         "class": "c_shell",
         "name": name,
+        "units": {"length": "m", "force": "N"},
         "material": {"young": 2.1e9, "poisson": 0.35, "density": 900.0, "elastic_limit": 4.0e7},
         "section": {"type": "rectangle", "width": 0.03, "height": 0.004},
         "curves": curves,

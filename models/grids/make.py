@@ -68,6 +68,7 @@ def design(name: str, surface: dict, network: dict) -> dict:
         "version": 1,
         "class": "grid",
         "name": name,
+        "units": {"length": "m", "force": "N"},
         "material": {"young": 2.1e9, "poisson": 0.35, "density": 900.0, "elastic_limit": 4.0e7},
         "section": {"type": "rectangle", "width": 0.004, "height": 0.03},
         "surface": surface,

@@ -51,10 +51,11 @@ def test_final_states_agree_with_the_reference_simulator(content, name):
         design.report_positions(state.state), np.array(reference["joint_positions"])
     )
     assert apart.max() <= REFERENCES[name]
-    assert state.elastic_energy == pytest.approx(reference["elastic_energy"], rel=0.015)
-    assert state.potential == pytest.approx(reference["total_energy"], rel=1e-4)
+    unit = content(name)["bbox_diagonal"]  # mm; the reference's lengths are in it
+    assert state.elastic_energy == pytest.approx(unit**3 * reference["elastic_energy"], rel=0.015)
+    assert state.potential == pytest.approx(unit**3 * reference["total_energy"], rel=1e-4)
     assert design.spacings(state.state) == pytest.approx(
-        np.array(reference["plate_spacing"]), rel=1e-3
+        unit * np.array(reference["plate_spacing"]), rel=1e-3
     )
 
 
@@ -85,7 +86,8 @@ def test_published_optimised_shape_is_reached_by_its_arm_lengths(content):
     """The file gives the deployed joints; the arm lengths that lead there are found from them, then
     deployed anew."""
     published = content("hemisphere_5t_published_equilibria")
-    wanted = np.array(published["tsf+energy"]["deformed_physical_joints"])
+    unit = content("hemisphere_5t")["bbox_diagonal"]  # mm
+    wanted = unit * np.array(published["tsf+energy"]["deformed_physical_joints"])
     design = Umbrella.from_release(content("hemisphere_5t"), "hemisphere_5t")
     rods = design.mesh.rods
     slots = 2 * rods.cells[rods.arms] + rods.sides[rods.arms]
@@ -97,7 +99,7 @@ def test_published_optimised_shape_is_reached_by_its_arm_lengths(content):
     q = (
         design.parameters
         * chords(wanted)
-        / chords(np.array(published["input"]["deformed_physical_joints"]))
+        / chords(unit * np.array(published["input"]["deformed_physical_joints"]))
     )
     state = design.deploy(q)["deployed"]
     joints = np.arange(len(wanted))
@@ -105,7 +107,7 @@ def test_published_optimised_shape_is_reached_by_its_arm_lengths(content):
         x = state.state.positions[joints]
         place = best_placement(wanted, x, np.full(len(joints), 1 / len(joints)))
         rows = Sensitivities(design.systems["deployed"], state).positions(joints)
-        turns = np.stack([np.cross(axis, x) for axis in np.eye(3)], axis=2).reshape(-1, 3)
+        turns = np.stack([np.cross(axis, x / unit) for axis in np.eye(3)], axis=2).reshape(-1, 3)
         motions = np.hstack([np.tile(np.eye(3), (len(x), 1)), turns])
         step = np.linalg.lstsq(
             np.hstack([rows, motions]), (place.apply(wanted) - x).ravel(), rcond=1e-4

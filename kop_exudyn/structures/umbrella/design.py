@@ -3,7 +3,7 @@ plates together."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ import numpy as np
 from ...errors import InputError, SimulationFailure
 from ...kit.groups import ElementGroup
 from ...rods.sections import Material, material_from_dict
+from ...units import Units
 from ..base import Design, Role, Target, register
 from .bodies import RODS, joint_bodies
 from .layout import BaseMesh, Plates, umbrella_mesh
@@ -116,8 +117,12 @@ class Umbrella(Design):
     def from_release(
         cls, data: Mapping[str, Any], source: str = "umbrella mesh", **options: Any
     ) -> Umbrella:
-        """The design of a released file's content; options as for the class. Raises InputError."""
-        return cls(options.pop("name", _stem(source)), release_mesh(data, source), **options)
+        """The design of a released file's content, in mm and N; options as for the class. Raises
+        InputError."""
+        mesh = release_mesh(data, source)
+        design = cls(options.pop("name", _stem(source)), mesh.scaled(mesh.unit), **options)
+        design.units = Units("mm", "N")
+        return design
 
     @cached_property
     def _model(self):
@@ -164,10 +169,8 @@ class Umbrella(Design):
         from ...equilibrium.system import System
 
         q = self.parameters if q is None else np.asarray(q, float)
-        scene, attraction = (
-            self._model.scene if self.mesh.target else self._held,
-            self.attractions(),
-        )
+        attraction = self.attractions()
+        scene = self._model.scene if attraction else self._held
         options, done = NewtonOptions(tolerance=self.deployment.tolerance), []
         start = self._model.compact(q, self.deployment.angle)
         for weight in self.deployment.weights:
@@ -201,15 +204,20 @@ class Umbrella(Design):
         target = self.mesh.target
         if target is None or not self.deployment.attraction:
             return ()
-        known = np.isfinite(target.crossings).all(axis=1)
-        n = np.count_nonzero(known) + self.mesh.n_cells
+        known, placed = (
+            np.isfinite(places).all(axis=1) for places in (target.crossings, target.plates)
+        )
+        n = np.count_nonzero(known) + np.count_nonzero(placed)
+        if not n:
+            return ()
         weight = self.deployment.attraction * self.deployment.share / (3 * n)
         weight *= self._model.energy_scale / self.mesh.size**2
-        return (
-            Attraction(self.joints[known], targets=target.crossings[known], target_weight=weight),
-            Attraction(
-                self._bodies.body[self.mesh.centres], targets=target.plates, target_weight=weight
-            ),
+        centres = self._bodies.body[self.mesh.centres]
+        pulled = ((self.joints, target.crossings, known), (centres, target.plates, placed))
+        return tuple(
+            Attraction(bodies[which], targets=places[which], target_weight=weight)
+            for bodies, places, which in pulled
+            if which.any()
         )
 
     @cached_property
@@ -322,20 +330,28 @@ def _target(data: Mapping[str, Any], base: BaseMesh) -> UmbrellaTarget:
     """The target of a design file; sizes are checked against the base mesh."""
     n_cells, n_edges = len(base.faces), len(base.cells)
     vertices, faces = np.array(data["vertices"], float), np.array(data["faces"], int)
-    crossings, plates = np.array(data["crossings"], float), np.array(data["plates"], float)
+    crossings = _places(data.get("crossings"), n_edges)
+    plates = _places(data.get("plates"), n_cells)
     for field, array, shape in (
         ("vertices", vertices, (len(vertices), 3)),
         ("faces", faces, (len(faces), 3)),
         ("crossings", crossings, (n_edges, 3)),
         ("plates", plates, (n_cells, 3)),
     ):
-        if array.shape != shape or not np.isfinite(array).all():
+        if array.shape != shape or np.isinf(array).any():
             raise InputError(f"expected finite numbers of shape {shape}", field=f"target.{field}")
     if faces.min(initial=0) < 0 or faces.max(initial=-1) >= len(vertices):
         raise InputError(
             f"names a vertex that doesn't exist (there are {len(vertices)})", field="target.faces"
         )
     return UmbrellaTarget(vertices, faces, crossings, plates)
+
+
+def _places(given: Sequence[Any] | None, n: int) -> np.ndarray:
+    """Places (n, 3); NaN for those that aren't known: all without a list, else those of null."""
+    if given is None:
+        return np.full((n, 3), np.nan)
+    return np.array([[np.nan] * 3 if place is None else place for place in given], float)
 
 
 def _count(data: Mapping[str, Any], field: str, default: int) -> int:

@@ -10,16 +10,20 @@ plates, t the thickness: the rule of the published designs.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+import shapely
 
 from ...errors import InputError
+from ...geometry.triangles import TriangleSurface
 from .layout import BaseMesh, Plates
 
 # The shortest published arms (32 mm on plates of 30 mm) belong to about this growth.
 LEAST_GROWTH = 4.0
 _MAX_ADJUSTMENTS = 60
+_ON_SURFACE = 1e-9  # of the plane's size: round-off of points on its border
 
 
 def hexagon_patch(rings: int, edge: float) -> tuple[np.ndarray, np.ndarray]:
@@ -111,6 +115,7 @@ def design_on_surface(
         "version": 1,
         "class": "umbrella",
         "name": name,
+        "units": {"length": "mm", "force": "N"},
         "base": {
             "vertices": base.vertices.round(6).tolist(),
             "faces": base.faces.tolist(),
@@ -206,22 +211,32 @@ class _Flattened:
         return np.einsum("nk,nkc->nc", weights, self.vertices[self.faces[face]])
 
     def around(self, points: np.ndarray) -> np.ndarray:
-        """Faces (m,) within a margin of the points' extent: the part of the surface that
-        matters."""
-        reach = 1.15 * np.linalg.norm(points, axis=1).max()
-        return np.flatnonzero(np.linalg.norm(self.plane[self.faces].mean(axis=1), axis=1) <= reach)
+        """Faces (m,) of the part of the surface that matters: those within a margin of the points'
+        extent, and of large faces those that reach into it."""
+        extent = np.linalg.norm(points, axis=1).max()
+        corners = self.plane[self.faces]
+        within = np.linalg.norm(corners.mean(axis=1), axis=1) <= 1.15 * extent
+        reaching = shapely.distance(shapely.polygons(corners), shapely.Point(0.0, 0.0)) <= extent
+        return np.flatnonzero(within | reaching)
+
+    @cached_property
+    def _map(self) -> TriangleSurface:
+        """The plane as a mesh, for finding the faces of its points."""
+        return TriangleSurface(np.column_stack([self.plane, np.zeros(len(self.plane))]), self.faces)
 
     def _locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        corners = self.plane[self.faces]
+        """Faces (n,) of the plane's points (n, 2), and barycentric coordinates (n, 3) in them."""
+        found = self._map.closest(np.column_stack([points, np.zeros(len(points))]))
+        if np.sqrt(found.squared_distances.max()) > _ON_SURFACE * self._map.diagonal:
+            raise InputError(
+                "the base mesh reaches beyond the surface: take fewer cells or smaller plates, or, "
+                "where the surface isn't drawn in the design's unit, say so by --scale",
+                field="surface",
+            )
+        corners = self.plane[self.faces[found.faces]]
         edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
-        inverse = np.linalg.inv(edges)
-        local = np.einsum("fij,nfj->nfi", inverse, points[:, None] - corners[None, :, 0])
-        weights = np.concatenate([1 - local.sum(axis=2, keepdims=True), local], axis=2)
-        face = weights.min(axis=2).argmax(axis=1)
-        rows = np.arange(len(points))
-        if weights[rows, face].min() < -1e-9:
-            raise InputError("the base mesh reaches beyond the surface", field="surface")
-        return face, weights[rows, face]
+        local = np.linalg.solve(edges, (points - corners[:, 0])[:, :, None])[:, :, 0]
+        return found.faces, np.concatenate([1 - local.sum(axis=1, keepdims=True), local], axis=1)
 
 
 def _areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:

@@ -39,6 +39,7 @@ def import_release(
         "version": 1,
         "class": "umbrella",
         "name": name,
+        "units": {"length": "mm", "force": "N"},
         "base": {
             "vertices": base.round(_DIGITS).tolist(),
             "faces": data["base_mesh_f"],
@@ -59,14 +60,18 @@ def import_release(
     if plate_model != RODS:
         own["plate_model"] = plate_model
     order = _same_crossings(released, umbrella_from_dict(own, source).mesh, source)
-    if released.target is not None and np.isfinite(released.target.crossings).all():
+    if released.target is not None:
         target = released.target
         own["target"] = {
             "vertices": (unit * target.vertices).round(6).tolist(),
             "faces": target.faces.tolist(),
-            "crossings": (unit * target.crossings[order]).round(6).tolist(),
-            "plates": (unit * target.plates).round(6).tolist(),
         }
+        for field, places in (("crossings", target.crossings[order]), ("plates", target.plates)):
+            if np.isfinite(places).any():
+                own["target"][field] = [
+                    place.tolist() if np.isfinite(place).all() else None
+                    for place in (unit * places).round(6)
+                ]
     return own
 
 

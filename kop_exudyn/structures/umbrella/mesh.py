@@ -9,7 +9,7 @@ and B, that turn against each other about it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,7 +25,7 @@ class UmbrellaTarget:
 
     vertices (V, 3), faces (F, 3) : surface
     crossings (n_crossings, 3) : where the X joints belong; NaN where it is not known
-    plates (n_cells, 3) : where the cells' midpoints belong
+    plates (n_cells, 3) : where the cells' midpoints belong; NaN where it is not known
     """
 
     vertices: np.ndarray
@@ -93,6 +93,25 @@ class UmbrellaMesh:
     @property
     def n_cells(self) -> int:
         return len(self.centres)
+
+    def scaled(self, factor: float) -> UmbrellaMesh:
+        """The same mesh with all lengths multiplied by a factor, and its unit divided by it."""
+        target, rods = self.target, self.rods
+        if target is not None:
+            target = UmbrellaTarget(
+                factor * target.vertices,
+                target.faces,
+                factor * target.crossings,
+                factor * target.plates,
+            )
+        lengths = ("positions", "lengths", "thickness", "width", "plate_edge", "spacing", "size")
+        return replace(
+            self,
+            **{name: factor * getattr(self, name) for name in lengths},
+            rods=replace(rods, offsets=factor * rods.offsets),
+            target=target,
+            unit=self.unit / factor,
+        )
 
     @cached_property
     def joint_lifts(self) -> tuple[np.ndarray, np.ndarray]:

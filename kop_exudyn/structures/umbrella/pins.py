@@ -83,7 +83,13 @@ def pins_from_dict(data: Mapping[str, Any], base: BaseMesh, target: UmbrellaTarg
         return Pins(joints, np.array(data["positions"], float))
     if target is None:
         raise InputError("without a target, pins need positions", field="pins.positions")
-    return Pins(joints, target.crossings[joints])
+    places = target.crossings[joints]
+    if not np.isfinite(places).all():
+        raise InputError(
+            "the target doesn't say where these joints belong: give their positions",
+            field="pins.positions",
+        )
+    return Pins(joints, places)
 
 
 def corner_joints(base: BaseMesh) -> np.ndarray:

@@ -2,7 +2,8 @@
 state.
 
 The data are those of the repository UmbrellaMesh_release_v1 of EPFL's Geometric Computing
-Laboratory. Lengths are divided by `bbox_diagonal` (mm). Joints are labelled OT, OB (plate centres),
+Laboratory. Lengths are divided by `bbox_diagonal` (mm), or in mm where the file has no such field.
+Joints are labelled OT, OB (plate centres),
 PT, PB (plate edges), AAM (X joints); rods PT, PB (plate rods) and TA, ANB (arms).
 """
 
@@ -37,26 +38,32 @@ REQUIRED = frozenset(
         "e_labels",
         "segment_normals",
         "base_mesh_f",
-        "bbox_diagonal",
     )
 )
+_LIKE_A_RELEASE = 8  # of these fields: files that lack some of the others are damaged releases
 
 
 def is_release(data: Any) -> bool:
-    """Whether a file's content looks like a released umbrella mesh."""
-    return isinstance(data, Mapping) and "class" not in data and data.keys() >= REQUIRED
+    """Whether a file's content looks like a released umbrella mesh, perhaps with fields missing."""
+    return (
+        isinstance(data, Mapping)
+        and not data.keys() & {"class", "format"}
+        and len(data.keys() & REQUIRED) >= _LIKE_A_RELEASE
+    )
 
 
 def release_mesh(data: Mapping[str, Any], source: str = "umbrella mesh") -> UmbrellaMesh:
-    """The mesh that a released file's content describes; raises InputError naming the field that is
-    wrong."""
+    """The mesh that a released file's content describes, in the file's own unit of length.
+
+    Raises InputError naming the field that is missing or wrong.
+    """
     missing = sorted(REQUIRED - data.keys()) if isinstance(data, Mapping) else sorted(REQUIRED)
     if missing:
         raise InputError(
-            "not a released umbrella mesh: a field is missing", source=source, field=missing[0]
+            "is missing in this released umbrella mesh", source=source, field=missing[0]
         )
     read = _Fields(data, source)
-    unit = read.number("bbox_diagonal")
+    unit = read.number("bbox_diagonal", 1.0)
     positions = read.array("vertices", (None, 3))
     n = len(positions)
     labels = read.labels("v_labels", n, (*_CENTRES, *_EDGES, _CROSSING))
@@ -195,20 +202,23 @@ def _rods(
 
 
 def _target(read: _Fields, crossings: np.ndarray, n: int, n_cells: int) -> UmbrellaTarget | None:
-    """The target, or None in the files that have none."""
-    if not {"target_v", "target_f", "correspondence", "plate_correspondence"} <= read.data.keys():
+    """The target, or None in the files that have none; places that a file doesn't give are NaN."""
+    if not {"target_v", "target_f"} <= read.data.keys():
         return None
     vertices = read.array("target_v", (None, 3))
-    listed = read.listed("correspondence", n)
-    points = np.full((len(crossings), 3), np.nan)
-    for row, k in enumerate(crossings):
-        if listed[k] is not None:
-            points[row] = read.values(listed[k], (3,), float, f"correspondence[{k}]")
+    points, plates = np.full((len(crossings), 3), np.nan), np.full((n_cells, 3), np.nan)
+    if "correspondence" in read.data:
+        listed = read.listed("correspondence", n)
+        for row, k in enumerate(crossings):
+            if listed[k] is not None:
+                points[row] = read.values(listed[k], (3,), float, f"correspondence[{k}]")
+    if "plate_correspondence" in read.data:
+        plates = read.array("plate_correspondence", (n_cells, 3))
     return UmbrellaTarget(
         vertices=vertices,
         faces=read.array("target_f", (None, 3), int, upper=len(vertices)),
         crossings=points,
-        plates=read.array("plate_correspondence", (n_cells, 3)),
+        plates=plates,
     )
 
 
