@@ -7,7 +7,7 @@ along y, its height along z.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -63,6 +63,9 @@ class Section:
     outline : (k, 2) corners (y, z) of the section, counter-clockwise: drawn, and used as stress
         points
     torsion_modulus : J / W_t, so that the largest shear stress is torque * this / J; length
+    centre : (y, z) of the centroid; not the origin where a part of the section is cut away
+    cut : what a joint leaves of the section, in the same axes; None where it takes nothing. It
+        carries stress, but does not make the rod softer: joints are short.
     """
 
     area: float
@@ -73,6 +76,8 @@ class Section:
     shear_z: float
     outline: np.ndarray
     torsion_modulus: float
+    centre: tuple[float, float] = (0.0, 0.0)
+    cut: Section | None = None
 
     def stiffness(self, material: Material) -> np.ndarray:
         """(EA, k_y GA, k_z GA, GJ, EI_y, EI_z): stiffness (6,) against stretch, shears, twist and
@@ -117,6 +122,36 @@ def rectangle(width: float, height: float) -> Section:
         outline=np.array([[y, z], [-y, z], [-y, -z], [y, -z]]),
         torsion_modulus=b * (1 - 8 / np.pi**2 * decay),
     )
+
+
+def half_lapped(section: Section) -> Section:
+    """A rectangle with a slot at its joints that takes the half above the y axis, for a crossing
+    rod."""
+    width, height = (float(side) for side in np.ptp(section.outline, axis=0))
+    half = rectangle(width, height / 2)
+    left = replace(half, outline=half.outline - [0.0, height / 4], centre=(0.0, -height / 4))
+    return replace(section, cut=left)
+
+
+def drilled(section: Section, diameter: float) -> Section:
+    """A rectangle with a hole along z through its joints. Raises InputError for a hole as wide as
+    the section."""
+    _positive("section.joint_hole", diameter)
+    width, height = (float(side) for side in np.ptp(section.outline, axis=0))
+    if diameter >= width:
+        raise InputError(
+            "must be smaller than the width", field="section.joint_hole", value=diameter
+        )
+    strip = rectangle((width - diameter) / 2, height)  # one of the two that are left
+    left = replace(
+        section,
+        area=2 * strip.area,
+        inertia_y=2 * strip.inertia_y,
+        inertia_z=height * (width**3 - diameter**3) / 12,
+        torsion=2 * strip.torsion,
+        torsion_modulus=strip.torsion_modulus,
+    )
+    return replace(section, cut=left)
 
 
 def circle(radius: float) -> Section:
@@ -182,9 +217,13 @@ def general(
     return Section(area, inertia_y, inertia_z, torsion, shear_y, shear_z, outline, torsion_modulus)
 
 
-def section_from_dict(data: Mapping[str, Any]) -> Section:
+def section_from_dict(data: Mapping[str, Any], *, half_lap: bool = False) -> Section:
     """The section that a design file describes: {"type": "rectangle" | "circle" | "general",
-    ...}."""
+    ...}.
+
+    half_lap : whether rectangles that say nothing of their joints ("half_lap", "joint_hole") are
+        slotted there to half their height
+    """
     makers: dict[str, Callable[..., Section]] = {
         "rectangle": rectangle,
         "circle": circle,
@@ -192,16 +231,25 @@ def section_from_dict(data: Mapping[str, Any]) -> Section:
     }
     options = dict(data)
     kind = options.pop("type", None)
+    slotted = options.pop("half_lap", half_lap and "joint_hole" not in options)
+    hole = options.pop("joint_hole", None)
+    if slotted and hole is not None:
+        raise InputError("a joint is a slot or a hole", field="section.half_lap", value=True)
     if kind not in makers:
         raise InputError(
             f"unknown section type (known: {', '.join(makers)})", field="section.type", value=kind
         )
     try:
-        return makers[kind](**options)
+        section = makers[kind](**options)
     except TypeError as error:
         raise InputError(
             f"wrong fields for a {kind} section: {error}", field="section", value=data
         ) from None
+    if kind != "rectangle":
+        return section
+    if hole is not None:
+        return drilled(section, hole)
+    return half_lapped(section) if slotted else section
 
 
 def material_from_dict(data: Mapping[str, Any]) -> Material:

@@ -124,6 +124,7 @@ class SceneBuilder:
         rest_strain: Any = None,
         weight: Any = None,
         section: Section | None = None,
+        cut: tuple[bool, bool] = (False, False),
     ) -> np.ndarray:
         """Add a rod piece of k equal elements along its k + 1 nodes; returns the elements (k,).
 
@@ -135,6 +136,7 @@ class SceneBuilder:
         rest_strain : (k, 6) the whole rest strain measure instead, as h / length of the unstressed
             relative motion h
         weight : (3,) dead load per rest length
+        cut : whether the section is cut at its first and last node, where a joint is
         """
         along = np.asarray(nodes, int)
         k = len(along) - 1
@@ -164,7 +166,7 @@ class SceneBuilder:
         )
         elements = np.arange(self._n_elements, self._n_elements + k)
         self._n_elements += k
-        self._chains.append(Chain(along, elements, section))
+        self._chains.append(Chain(along, elements, section, cut))
         return elements
 
     def rigid(self, nodes: Sequence[int], section: Section | None = None) -> None:

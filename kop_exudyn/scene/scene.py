@@ -41,11 +41,15 @@ class Driven:
 @dataclass(frozen=True)
 class Chain:
     """One rod piece as it is drawn and exported: its nodes in order, its elements (none: rigid),
-    its cross-section."""
+    its cross-section.
+
+    cut : whether a joint cuts the section at the first and at the last node, see `Section.cut`
+    """
 
     nodes: np.ndarray
     elements: np.ndarray
     section: Section | None = None
+    cut: tuple[bool, bool] = (False, False)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,9 @@ rectangles; 4/3 would do for circles). Equivalent stress after von Mises, sqrt(s
 of the worse of two points: a corner with torsion's largest shear, or the section's middle with that
 and the transverse shear. Torsion is largest at the middle of a side, so the sum is on the safe
 side.
+
+Where a joint cuts a rod (a half-lap's slot, a bolt's hole; `Section.cut`), the same is asked of
+what is left there. Nothing that fills the cut is counted on, nor are the peaks at its corners.
 """
 
 from __future__ import annotations
@@ -85,8 +88,12 @@ def rod_strength(
     lengths = scene.rest_lengths(equilibrium.q)
     axial, normal, shear, equivalent = np.full((4, n), np.nan)
     for section, elements in _by_section(scene):
-        rows = _section_stress(section, equilibrium.stress[elements], lengths[elements])
+        rows = section_stress(section, equilibrium.stress[elements], lengths[elements])
         axial[elements], normal[elements], shear[elements], equivalent[elements] = rows
+    for section, elements, end in _cut_ends(scene):
+        rows = section_stress(section, equilibrium.stress[elements], lengths[elements], (end,))
+        for whole, at_cut in zip((normal, shear, equivalent), rows[1:]):
+            whole[elements] = np.maximum(whole[elements], at_cut)
     limit = material_values(scene, materials, "elastic_limit", np.fmin)
     return Strength(axial, normal, shear, equivalent, limit)
 
@@ -158,14 +165,32 @@ def _by_section(scene: Scene) -> Iterator[tuple[Section, np.ndarray]]:
         yield section, np.concatenate(parts)
 
 
-def _section_stress(
-    section: Section, stress: np.ndarray, lengths: np.ndarray
+def _cut_ends(scene: Scene) -> Iterator[tuple[Section, np.ndarray, float]]:
+    """What is left of the sections that joints cut, with the elements that begin (-0.5) or end
+    (0.5) there."""
+    found: dict[tuple[int, float], tuple[Section, list[int]]] = {}
+    for chain in scene.chains:
+        left = None if chain.section is None else chain.section.cut
+        for place, end, here in zip((0, -1), (-0.5, 0.5), chain.cut):
+            if left is not None and here and len(chain.elements):
+                found.setdefault((id(left), end), (left, []))[1].append(int(chain.elements[place]))
+    for (_, end), (left, elements) in found.items():
+        yield left, np.array(elements), end
+
+
+def section_stress(
+    section: Section, stress: np.ndarray, lengths: np.ndarray, at: Sequence[float] = (-0.5, 0.5)
 ) -> tuple[np.ndarray, ...]:
-    """axial, normal, shear, equivalent (n,) for generalised stresses (n, 6)."""
+    """axial, normal, shear, equivalent (n,) for generalised stresses (n, 6).
+
+    at : where along the elements, in lengths from the middle. Stresses are about the origin of the
+        section's axes; a section whose centroid lies elsewhere is bent by the axial force.
+    """
     N, Qy, Qz, Mt, My, Mz = stress.T
     axial = N / section.area
-    y, z = section.outline.T
-    ends = np.array([[-0.5], [0.5]]) * lengths  # (2, n), from the middle
+    My, Mz = My - N * section.centre[1], Mz + N * section.centre[0]
+    y, z = (section.outline - section.centre).T
+    ends = np.multiply.outer(np.array(at), lengths)
     bending = np.multiply.outer(My + ends * Qz, z / section.inertia_y) - np.multiply.outer(
         Mz - ends * Qy, y / section.inertia_z
     )

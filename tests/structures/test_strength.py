@@ -5,11 +5,25 @@ import pytest
 
 from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.equilibrium.system import System
-from kop_exudyn.rods.sections import Material, circle, general, rectangle
+from kop_exudyn.errors import InputError
+from kop_exudyn.rods.sections import (
+    Material,
+    circle,
+    drilled,
+    general,
+    half_lapped,
+    rectangle,
+    section_from_dict,
+)
 from kop_exudyn.scene.builder import SceneBuilder
 from kop_exudyn.scene.loads import BodyMoments, DeadForces
 from kop_exudyn.structures.base import design_from_dict
-from kop_exudyn.structures.strength import design_strength, materials_of, rod_strength
+from kop_exudyn.structures.strength import (
+    design_strength,
+    materials_of,
+    rod_strength,
+    section_stress,
+)
 
 MATERIAL = Material(2e9, 0.35, elastic_limit=4e7)
 SECTION = rectangle(0.03, 0.004)
@@ -149,3 +163,75 @@ def test_a_design_brings_its_materials():
     for role, strength in found.items():
         assert len(strength.limit) == len(design.scene(role).elements)
         assert 0 <= strength.largest < 1
+
+
+def test_a_half_lap_is_a_bar_half_as_high_under_its_eccentric_force():
+    """N, bending and torsion at a slotted end, by the handbook's formulas for the bar that is
+    left."""
+    section = half_lapped(rectangle(0.006, 0.04))
+    left = section.cut
+    assert left.area == pytest.approx(0.006 * 0.02) and left.centre == (0.0, -0.01)
+    N, My, Mz = 120.0, 0.8, 0.3
+    stress = np.array([[N, 0.0, 0.0, 0.0, My, Mz]])
+    axial, normal, _, _ = section_stress(left, stress, np.array([1.0]), (0.5,))
+    b, h = 0.006, 0.02
+    moment = My + N * 0.01  # the force acts h / 2 above the middle of what is left
+    wanted = N / (b * h) + 6 * moment / (b * h**2) + 6 * Mz / (h * b**2)
+    assert axial[0] == pytest.approx(N / (b * h)) and normal[0] == pytest.approx(wanted)
+    # from the whole section's own middle: eight times the stress of the uncut bar under a force
+    alone = section_stress(left, stress * [1, 0, 0, 0, 0, 0], np.array([1.0]))[1]
+    assert alone[0] == pytest.approx(8 * N / (0.006 * 0.04))
+
+
+def test_a_hole_leaves_the_edges():
+    section = drilled(rectangle(0.03, 0.004), 0.006)
+    Mz = 0.5
+    stress = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, Mz]])
+    normal = section_stress(section.cut, stress, np.array([1.0]))[1]
+    assert normal[0] == pytest.approx(Mz * 0.015 / (0.004 * (0.03**3 - 0.006**3) / 12))
+    with pytest.raises(InputError, match="joint_hole"):
+        drilled(rectangle(0.03, 0.004), 0.03)
+
+
+@pytest.mark.parametrize(
+    "fields, factor",
+    [({"half_lap": False}, 1.0), ({}, 4.0), ({"joint_hole": 0.003}, 0.006 / 0.003)],
+)
+def test_design_files_say_how_joints_are_cut(fields, factor):
+    """In-plane bending of a grid's lamella: the section modulus of what is left at its joints."""
+    given = {"type": "rectangle", "width": 0.006, "height": 0.04, **fields}
+    section = section_from_dict(given, half_lap=True)
+    left = section.cut or section
+    stress = np.array([[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]])
+    whole = section_stress(section, stress, np.array([1.0]))[1]
+    assert section_stress(left, stress, np.array([1.0]))[1] == pytest.approx(factor * whole)
+    with pytest.raises(InputError, match="slot or a hole"):
+        section_from_dict({**given, "half_lap": True, "joint_hole": 0.001})
+
+
+def test_only_ends_at_joints_are_weakened():
+    """A cantilever clamped at its second end: cut there, its largest stress is that of what is
+    left; cut at the free end, nothing changes."""
+    section = half_lapped(rectangle(0.006, 0.04))
+    stress = {}
+    for cut in ((False, False), (True, False), (False, True)):
+        builder = SceneBuilder()
+        bodies = builder.bodies([[0, 0, 0], [0.5, 0, 0], [1, 0, 0]])
+        stiffness = section.stiffness(MATERIAL)
+        builder.rod(builder.nodes(bodies), stiffness, length=1.0, section=section, cut=cut)
+        builder.pin(int(bodies[2]))
+        builder.term(DeadForces([bodies[0]], [[0.0, 0.0, -1e-3]]))
+        scene = builder.build()
+        stress[cut] = rod_strength(scene, solve(System(scene), np.empty(0)))
+    none, free, clamped = stress.values()
+    assert free.normal.max() == pytest.approx(none.normal.max(), rel=1e-6)
+    assert clamped.normal.max() == pytest.approx(4 * none.normal.max(), rel=1e-3)
+    np.testing.assert_array_equal(clamped.normal[0], none.normal[0])
+
+
+def test_grids_and_shells_are_cut_at_their_joints_only(shells):
+    for design in shells[:1]:
+        scene = design.scene("deployed")
+        for chain in scene.chains:
+            at = np.isin(scene.node_body[chain.nodes[[0, -1]]], design.joints)
+            assert chain.cut == tuple(at)

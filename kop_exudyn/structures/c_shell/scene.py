@@ -154,7 +154,15 @@ def shell_scene(
         nodes = [int(inner[b] if n is None else n) for n, b in zip(nodes, piece.bodies)]
         strain = _rest_strain(layout, piece, straight, imperfection)
         length = {"parameter": piece.parameter} if straight else {"length": np.diff(piece.stations)}
-        build.rod(nodes, model.stiffness, section=model.section, rest_strain=strain, **length)
+        first, last = (bool(body < network.n_joints) for body in piece.bodies[[0, -1]])
+        build.rod(
+            nodes,
+            model.stiffness,
+            section=model.section,
+            rest_strain=strain,
+            cut=(first, last),
+            **length,
+        )
     build.mean_angle(hinges[network.opens])
     build.pin(int(bodies[middle_joint(network.joints)]))
     if planar:

@@ -205,7 +205,7 @@ def read_grid(data: Mapping[str, Any], source: str) -> Grid:
             data["name"],
             surface,
             network_on(surface, data["network"]),
-            section_from_dict(data["section"]),
+            section_from_dict(data["section"], half_lap=True),
             material_from_dict(data["material"]),
             elements_per_piece=data.get("elements_per_piece", 2),
             held=data.get("held"),

@@ -104,12 +104,20 @@ def _add_span(
     angle = builder.hinges([0.0], parameter=int(numbers.corners[k]), factor=-1.0, prescribed=True)
     arrive, leave = builder.nodes([corner[0]] * 2, [-1, int(angle[0])], _CORNER_FRAME)
 
-    def piece(tail: int, head: int, line: np.ndarray, sides: np.ndarray, parameter: int) -> None:
+    def piece(
+        tail: int,
+        head: int,
+        line: np.ndarray,
+        sides: np.ndarray,
+        parameter: int,
+        cut: tuple[bool, bool],
+    ) -> None:
         steps = np.linspace(0, 1, pieces + 1)[1:-1, None]
         normal = (1 - steps) * sides[0] + steps * sides[1]
         frames = _frames(np.broadcast_to(line[1] - line[0], normal.shape), normal)
         inner = builder.nodes(builder.bodies(line[0] + steps * (line[1] - line[0]), frames))
-        builder.rod([tail, *inner, head], stiffness, parameter=parameter, section=section)
+        along = [tail, *inner, head]
+        builder.rod(along, stiffness, parameter=parameter, section=section, cut=cut)
 
     first, last = nodes[ends]
     piece(
@@ -118,6 +126,7 @@ def _add_span(
         np.array([a, middle]),
         np.array([normals[0], normal]),
         int(numbers.before[k]),
+        (True, False),
     )
     piece(
         int(leave),
@@ -125,6 +134,7 @@ def _add_span(
         np.array([middle, b]),
         np.array([normal, normals[1]]),
         int(numbers.after[k]),
+        (False, True),
     )
 
 
