@@ -14,6 +14,7 @@ from ..equilibrium.newton import Equilibrium, refine
 from ..equilibrium.warm_up import warm_up
 from ..errors import SimulationFailure
 from ..structures.base import Design
+from ..structures.deviation import fit_summary
 from ..structures.fitting import FitResult, TargetFitting
 from ..structures.loads import LoadCase
 from ..structures.strength import strength_summary
@@ -83,7 +84,7 @@ class SimulationResult:
             "stable": final.stable,
             "opening_angle": final.opening,
             "exudyn": self.confirmations[self.design.fitted_role.name].to_dict(),
-            "fit": {"max_percent": self.fit.max_percent, "mean_percent": self.fit.mean_percent},
+            "fit": fit_summary(self.design, self.design.target, self.fit, final.state),
             "displaced_percent": self.displaced_percent,
             "strength": strength_summary(self.design, self.equilibria),
             **({"loaded": self.loaded.to_dict()} if self.loaded is not None else {}),

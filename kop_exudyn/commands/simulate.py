@@ -98,7 +98,7 @@ def _summary(result: dict, units: Units | None) -> str:
         "design": result["design"],
         "model": f"{result['elements']:,} elements, {result['unknowns']:,} unknowns",
         "deviation": f"max {fit['max_percent']:.3g} %, mean {fit['mean_percent']:.3g} % "
-        "of the target's box diagonal",
+        f"of the target's box diagonal; max {with_unit(fit['max'], 'length', units, 3)}",
         "displacement": f"max {result['displaced_percent']:.3g} % from the joints' own places",
         "elastic energy": with_unit(result["elastic_energy"], "energy", units, 6),
         "stable": "yes" if result["stable"] else "no",
@@ -106,6 +106,11 @@ def _summary(result: dict, units: Units | None) -> str:
         "Exudyn": f"{exudyn['version']}: {exudyn['newton_steps']} steps, "
         f"moved by {exudyn['moved']:.1e} of its size",
     }
+    if fit["pieces_max"] != fit["max"]:
+        rows["between joints"] = (
+            f"max {fit['pieces_max_percent']:.3g} %, mean {fit['pieces_mean_percent']:.3g} %; "
+            f"max {with_unit(fit['pieces_max'], 'length', units, 3)}"
+        )
     if result["opening_angle"] is not None:
         angle = result["opening_angle"]
         rows["opening angle"] = f"{angle:.4g} rad, {math.degrees(angle):.4g}°"

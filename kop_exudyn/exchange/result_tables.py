@@ -13,6 +13,7 @@ from ..fabrication.pieces import parts_list_of
 from ..search.objective import Evaluation
 from ..search.result import INPUT, REDEPLOYED, STAGES, KitResult
 from ..structures.base import Design
+from ..structures.deviation import fit_summary
 from ..structures.strength import design_strength
 from .vtk import element_fields
 
@@ -71,7 +72,8 @@ def _designs(result: KitResult) -> Iterator[dict[str, Any]]:
         if not isinstance(outcome, Evaluation):
             yield row | {"failed": str(outcome)}
             continue
-        row |= {"max_percent": outcome.fit.max_percent, "mean_percent": outcome.fit.mean_percent}
+        state = outcome.equilibria[design.fitted_role.name].state
+        row |= fit_summary(design, result.references[n].target, outcome.fit, state)
         yield row | _states(result, n, outcome.equilibria)
 
 

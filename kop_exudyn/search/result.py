@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import SimulationFailure
 from ..kit.parts import Assignment, Kit
 from ..structures.base import Design
+from ..structures.deviation import fit_summary
 from ..structures.fitting import TargetFitting
 from ..structures.strength import strength_summary
 from ..units import Units, common_units
@@ -70,10 +71,10 @@ class KitResult:
         """Fit and energy of one input design: what of a stage's deviation no kit is to blame
         for."""
         design, reference = self.designs[number], self.references[number]
-        joints = reference.equilibria[design.fitted_role.name].state.positions[design.joints]
-        fit = TargetFitting(reference.target)(joints)
+        state = reference.equilibria[design.fitted_role.name].state
+        fit = TargetFitting(reference.target)(state.positions[design.joints])
         return {
-            "fit": {"max_percent": fit.max_percent, "mean_percent": fit.mean_percent},
+            "fit": fit_summary(design, reference.target, fit, state),
             "elastic_energy": reference.energy,
         }
 
@@ -88,13 +89,14 @@ class KitResult:
             return {"failed": str(opened)}
         if isinstance(kept, SimulationFailure):
             return {"failed": str(kept)}
-        role = self.designs[number].fitted_role.name
-        moved = distance(self.designs[number], opened, kept)
+        design, target = self.designs[number], self.references[number].target
+        role = design.fitted_role.name
+        moved = distance(design, opened, kept)
         energy = opened.equilibria[role].elastic_energy
         return {
             "same_state": moved <= SAME_STATE,
             "moved_percent": 100 * moved,
-            "fit": {"max_percent": opened.fit.max_percent, "mean_percent": opened.fit.mean_percent},
+            "fit": fit_summary(design, target, opened.fit, opened.equilibria[role].state),
             "elastic_energy": energy,
             "energy_ratio": energy / self.references[number].energy,
         }
@@ -153,9 +155,9 @@ def summary_of(
     if isinstance(outcome, SimulationFailure):
         return {"failed": str(outcome)}
     role = design.fitted_role.name
-    energy = outcome.equilibria[role].elastic_energy
+    energy, state = outcome.equilibria[role].elastic_energy, outcome.equilibria[role].state
     return {
-        "fit": {"max_percent": outcome.fit.max_percent, "mean_percent": outcome.fit.mean_percent},
+        "fit": fit_summary(design, reference.target, outcome.fit, state),
         "elastic_energy": energy,
         "energy_ratio": energy / reference.energy,
         "stable": all(eq.stable for eq in outcome.equilibria.values()),

@@ -78,6 +78,8 @@ class Design(ABC):
     # structures whose shape hardly depends on their parts need more of it, those with many soft
     # modes less.
     fit_weight: ClassVar[float] = 1e4
+    # Whether rods lie beside the target, so that only the joints' distances from it count.
+    beside_target: ClassVar[bool] = False
     # Typical change of parameters that belong to no element.
     free_scale: float = 1.0
     # What acts on the deployed design; the search for a kit is for the unloaded one.

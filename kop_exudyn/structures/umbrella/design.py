@@ -72,6 +72,7 @@ class Umbrella(Design):
     """
 
     class_name = "umbrella"
+    beside_target = True  # the plates lie on either side of it
     roles = (Role("deployed", fitted=True),)
 
     def __init__(

@@ -1,0 +1,70 @@
+"""How far a built design is from its target: its joints, and the pieces between them.
+
+Joints may all lie on the target while the corners between them stand off it: what is built is both.
+Distances are from the target's surface, at the placement in space that fits the joints best. They
+are given in the design's unit of length and in percent of the diagonal of the target's bounding
+box.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..geometry.triangles import TriangleSurface
+from ..scene.state import State
+from .base import Design, Target
+from .fitting import FitResult
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Distances from the target's surface, in the design's unit of length.
+
+    joints (n,) : of the joints
+    pieces (m,) : of all points that the rods are followed at, corners and joints included; the
+        joints alone for designs whose rods lie beside the target
+    diagonal : of the target's bounding box
+    """
+
+    joints: np.ndarray
+    pieces: np.ndarray
+    diagonal: float
+
+    def to_dict(self) -> dict[str, float]:
+        """Largest and mean distances, in units of length and in % of the diagonal, as results have
+        them."""
+        found = {"max": self.joints.max(), "mean": self.joints.mean()}
+        found |= {"pieces_max": self.pieces.max(), "pieces_mean": self.pieces.mean()}
+        percent = {f"{name}_percent": 100 * d / self.diagonal for name, d in found.items()}
+        return {name: float(value) for name, value in (percent | found).items()}
+
+
+def deviation(design: Design, target: Target, fit: FitResult, state: State) -> Deviation:
+    """The deviation of a design's fitted state.
+
+    fit : of its joints, which says where it is placed
+    """
+    distances = fit.distances
+    if not design.beside_target:
+        points = rod_points(design, state)
+        closest = TriangleSurface(target.vertices, target.faces).closest(
+            fit.placement.apply(points)
+        )
+        distances = np.concatenate([distances, np.sqrt(closest.squared_distances)])
+    return Deviation(fit.distances, distances, fit.diagonal)
+
+
+def rod_points(design: Design, state: State) -> np.ndarray:
+    """(m, 3) ends of all elements of a design's rods in its fitted state."""
+    scene = design.scene(design.fitted_role.name)
+    nodes = np.unique(np.concatenate([chain.nodes for chain in scene.chains]))
+    return scene.node_poses(state)[0][nodes]
+
+
+def fit_summary(design: Design, target: Target, fit: FitResult, state: State) -> Mapping[str, Any]:
+    """The field "fit" of results, see `Deviation.to_dict`."""
+    return deviation(design, target, fit, state).to_dict()
