@@ -1,13 +1,14 @@
-"""Where planar curves cross: a vectorised search among their coarse polylines, then Newton's method
-to round-off."""
+"""Where planar curves cross: a search among their coarse polylines by a tree of boxes, then
+Newton's method to round-off, for all candidates at once."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import shapely
 
 from ..errors import InputError
 from .curves import Curve
@@ -19,6 +20,9 @@ TOLERANCE = 1e-6
 _LEAST_ANGLE = 0.02
 _NEWTON = 40
 _NEAR_SINGULAR = 1e-4
+_MOST_PIECES = 2_000_000  # of all coarse polylines: some hundred thousand points
+
+Pair = tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -28,7 +32,7 @@ class Crossing:
     curves : their numbers; stations : arc lengths on them; position (2,)
     """
 
-    curves: tuple[int, int]
+    curves: Pair
     stations: tuple[float, float]
     position: np.ndarray
 
@@ -43,15 +47,9 @@ def find_crossings(curves: Sequence[Curve]) -> list[Crossing]:
     """All crossings of different curves, in the order of their numbers and stations.
 
     Raises InputError for curves that cross themselves, touch without crossing, or run along each
-    other.
+    other, and for more points than can be searched.
     """
-    size, chords = size_of(curves), [_Chords(curve) for curve in curves]
-    for curve, own in zip(curves, chords):
-        _refuse_self_crossing(curve, own)
-    found = []
-    for a, b in _overlapping(chords, TOLERANCE * size):
-        found += _cross_pair(curves, chords, a, b, size)
-    return found
+    return [crossing for found in _search(curves).values() for crossing in found]
 
 
 def given_crossings(curves: Sequence[Curve], listed: Sequence[Mapping[str, Any]]) -> list[Crossing]:
@@ -60,172 +58,220 @@ def given_crossings(curves: Sequence[Curve], listed: Sequence[Mapping[str, Any]]
 
     Raises InputError naming the entry that can't be found, is ambiguous or is there twice.
     """
-    size, chords = size_of(curves), [_Chords(curve) for curve in curves]
-    for curve, own in zip(curves, chords):
-        _refuse_self_crossing(curve, own)
+    pairs = [_pair(entry, len(curves), f"crossings[{n}]") for n, entry in enumerate(listed)]
+    known = _search(curves, set(pairs))
     found: list[Crossing] = []
-    for n, entry in enumerate(listed):
+    for n, (entry, pair) in enumerate(zip(listed, pairs)):
         field = f"crossings[{n}]"
-        a, b = _pair(entry, len(curves), field)
-        candidates = _cross_pair(curves, chords, a, b, size)
-        if not candidates:
-            raise InputError("these two curves don't cross", field=field, value=[a, b])
-        crossing = _choose(candidates, entry, field)
+        if pair not in known:
+            raise InputError("these two curves don't cross", field=field, value=list(pair))
+        crossing = _choose(known[pair], entry, field)
         if any(
             np.array_equal(crossing.position, other.position) and crossing.curves == other.curves
             for other in found
         ):
-            raise InputError("the same crossing is listed twice", field=field, value=[a, b])
+            raise InputError("the same crossing is listed twice", field=field, value=list(pair))
         found.append(crossing)
     return found
 
 
-class _Chords:
-    """A curve's coarse polyline with the boxes (low, high) that hold its pieces of curve."""
+class _Pieces:
+    """All curves' coarse polylines, piece by piece.
 
-    def __init__(self, curve: Curve):
-        points = curve.position(curve.stations)
-        if curve.closed:
-            points[-1] = points[0]
-        self.start, self.end = points[:-1], points[1:]
-        sag = curve.sags[:, None]
-        self.low = np.minimum(self.start, self.end) - sag
-        self.high = np.maximum(self.start, self.end) + sag
-        self.box = np.stack([self.low.min(axis=0), self.high.max(axis=0)])
+    start, end (n, 2) : of the chords; curve (n,) : the curve that each is of
+    first (m + 1,) : where each curve's pieces begin; stations (n, 2) : arc lengths of their ends
+    """
+
+    def __init__(self, curves: Sequence[Curve]):
+        counts = [len(curve.sags) for curve in curves]
+        self.first = np.concatenate([[0], np.cumsum(counts)])
+        if self.first[-1] > _MOST_PIECES:
+            raise InputError(
+                f"have {self.first[-1]:,} pieces between their points; at most {_MOST_PIECES:,} "
+                "can be searched for crossings: draw them with fewer points",
+                field="curves",
+            )
+        self.curve = np.repeat(np.arange(len(curves)), counts)
+        nodes = []
+        for curve in curves:
+            points = curve.position(curve.stations)
+            if curve.closed:
+                points[-1] = points[0]
+            nodes.append(points)
+        self.start = np.concatenate([points[:-1] for points in nodes])
+        self.end = np.concatenate([points[1:] for points in nodes])
+        self.stations = np.concatenate(
+            [np.stack([c.stations[:-1], c.stations[1:]], axis=1) for c in curves]
+        )
+        self.sags = np.concatenate([curve.sags for curve in curves])
+
+    def meeting(self, margin: float) -> tuple[np.ndarray, np.ndarray]:
+        """Pairs i < j of pieces whose boxes, which hold their pieces of curve, are within a margin
+        of each other."""
+        room = (self.sags + 0.5 * margin)[:, None]
+        low, high = np.minimum(self.start, self.end) - room, np.maximum(self.start, self.end) + room
+        boxes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
+        i, j = shapely.STRtree(boxes).query(boxes)
+        ahead = i < j
+        return i[ahead], j[ahead]
 
 
-def _overlapping(chords: Sequence[_Chords], margin: float) -> list[tuple[int, int]]:
-    """Pairs of curves whose boxes overlap."""
-    low, high = (np.array([c.box[k] for c in chords]) for k in (0, 1))
-    meet = (low[:, None] <= high + margin).all(axis=2)
-    return [(int(a), int(b)) for a, b in np.argwhere(np.triu(meet & meet.T, 1))]
-
-
-def _boxes_meet(A: _Chords, B: _Chords, margin: float) -> np.ndarray:
-    """(n, m) bool: whether piece i of A and piece j of B may meet."""
-    x, y = (
-        (A.low[:, None, k] <= B.high[:, k] + margin) & (B.low[:, k] <= A.high[:, None, k] + margin)
-        for k in (0, 1)
-    )
-    return x & y
-
-
-def _cross_pair(
-    curves: Sequence[Curve], chords: Sequence[_Chords], a: int, b: int, size: float
-) -> list[Crossing]:
-    """All crossings of curves a and b."""
-    A, B, margin = chords[a], chords[b], TOLERANCE * size
-    i, j = np.nonzero(_boxes_meet(A, B, margin))
+def _search(
+    curves: Sequence[Curve], wanted: Collection[Pair] | None = None
+) -> dict[Pair, list[Crossing]]:
+    """The crossings of all pairs of curves, or of the wanted ones, in order."""
+    margin, pieces = TOLERANCE * size_of(curves), _Pieces(curves)
+    i, j = pieces.meeting(margin)
+    own = pieces.curve[i] == pieces.curve[j]
+    _refuse_self_crossing(curves, pieces, i[own], j[own])
+    i, j = i[~own], j[~own]
+    if wanted is not None:
+        pairs = zip(pieces.curve[i].tolist(), pieces.curve[j].tolist())
+        keep = np.fromiter((pair in wanted for pair in pairs), bool, len(i))
+        i, j = i[keep], j[keep]
     if not len(i):
-        return []
-    s, t = _guess(curves[a], A, i), _guess(curves[b], B, j)
-    s, t, gap, sine = _polish(
-        curves[a], curves[b], *_chord_crossing(A, B, i, j, curves[a], curves[b], s, t)
-    )
-    inside = _on(curves[a], s, margin) & _on(curves[b], t, margin)
+        return {}
+    return _crossings(curves, pieces, i, j, margin)
+
+
+def _crossings(
+    curves: Sequence[Curve], pieces: _Pieces, i: np.ndarray, j: np.ndarray, margin: float
+) -> dict[Pair, list[Crossing]]:
+    """The crossings near to pairs of pieces, by the curves' numbers, in order."""
+    a, b = pieces.curve[i], pieces.curve[j]
+    lengths = np.array([curve.length for curve in curves])
+    closed = np.array([curve.closed for curve in curves])
+    s, t, gap, sine = _polish(curves, lengths, a, b, *_chord_crossing(pieces, i, j))
+    inside = _on(closed[a], lengths[a], s, margin) & _on(closed[b], lengths[b], t, margin)
     meeting = inside & (gap <= margin)
     touching = np.flatnonzero(meeting & (np.abs(sine) < np.sin(_LEAST_ANGLE)))
     if len(touching):
-        x = curves[a].position(s[touching[0]])
+        k = touching[np.lexsort((s[touching], b[touching], a[touching]))[0]]
+        x, other = curves[a[k]].position(s[k]), curves[b[k]].field
         raise InputError(
-            f"touches {curves[b].field} or runs along it near ({x[0]:.6g}, {x[1]:.6g}) instead of "
-            "crossing it",
-            field=curves[a].field,
+            f"touches {other} or runs along it near ({x[0]:.6g}, {x[1]:.6g}) instead of crossing "
+            "it",
+            field=curves[a[k]].field,
         )
-    keep = np.flatnonzero(meeting & (gap <= 1e-9 * size))
-    return _distinct(curves, (a, b), _clip(curves[a], s[keep]), _clip(curves[b], t[keep]), margin)
+    keep = np.flatnonzero(meeting & (gap <= 1e-3 * margin))
+    a, b = a[keep], b[keep]
+    s, t = _clip(closed[a], lengths[a], s[keep]), _clip(closed[b], lengths[b], t[keep])
+    positions = 0.5 * (_frames(curves, a, s)[0] + _frames(curves, b, t)[0])
+    found: dict[Pair, list[Crossing]] = {}
+    for k in np.lexsort((s, b, a)).tolist():
+        pair = (int(a[k]), int(b[k]))
+        others = found.setdefault(pair, [])
+        # neighbouring pieces find the same one
+        if all(np.hypot(*(positions[k] - other.position)) > margin for other in others):
+            others.append(Crossing(pair, (float(s[k]), float(t[k])), positions[k]))
+    return found
 
 
-def _guess(curve: Curve, chords: _Chords, pieces: np.ndarray) -> np.ndarray:
-    return 0.5 * (curve.stations[pieces] + curve.stations[pieces + 1])
+def _frames(
+    curves: Sequence[Curve], which: np.ndarray, s: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and unit tangents (n, 2) of curves (n,) at stations s (n,), curve by curve."""
+    x, tangents = np.empty((len(s), 2)), np.empty((len(s), 2))
+    order = np.argsort(which, kind="stable")
+    bounds = np.flatnonzero(np.diff(which[order], prepend=-1, append=-1))
+    for first, last in zip(bounds[:-1], bounds[1:]):
+        rows = order[first:last]
+        x[rows], tangents[rows] = curves[which[rows[0]]].frame(s[rows])
+    return x, tangents
 
 
-def _chord_crossing(A, B, i, j, curve_a, curve_b, s, t) -> tuple[np.ndarray, np.ndarray]:
-    """Stations (n,), (n,) where the chords' lines cross, or the given ones where they are nearly
-    parallel."""
-    u, v, w = A.end[i] - A.start[i], B.end[j] - B.start[j], B.start[j] - A.start[i]
+def _chord_crossing(pieces: _Pieces, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Stations (n,), (n,) where the chords' lines cross, or the pieces' middles where they are
+    nearly parallel."""
+    u, v = pieces.end[i] - pieces.start[i], pieces.end[j] - pieces.start[j]
+    w = pieces.start[j] - pieces.start[i]
     det = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     good = np.abs(det) > 1e-3 * np.hypot(*u.T) * np.hypot(*v.T)
     safe = np.where(good, det, 1.0)
     f = np.clip((w[:, 0] * v[:, 1] - w[:, 1] * v[:, 0]) / safe, 0, 1)
     g = np.clip((w[:, 0] * u[:, 1] - w[:, 1] * u[:, 0]) / safe, 0, 1)
-    on_a = curve_a.stations[i] + f * (curve_a.stations[i + 1] - curve_a.stations[i])
-    on_b = curve_b.stations[j] + g * (curve_b.stations[j + 1] - curve_b.stations[j])
-    return np.where(good, on_a, s), np.where(good, on_b, t)
+    f, g = np.where(good, f, 0.5), np.where(good, g, 0.5)
+    of_i, of_j = pieces.stations[i], pieces.stations[j]
+    return (1 - f) * of_i[:, 0] + f * of_i[:, 1], (1 - g) * of_j[:, 0] + g * of_j[:, 1]
 
 
 def _polish(
-    a: Curve, b: Curve, s: np.ndarray, t: np.ndarray
+    curves: Sequence[Curve],
+    lengths: np.ndarray,
+    a: np.ndarray,
+    b: np.ndarray,
+    s: np.ndarray,
+    t: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Newton's method on a(s) = b(t) for all candidates; returns s, t, the gaps left, and the sines
-    of the angles.
+    """Newton's method on a(s) = b(t) for all candidates (n,), those that still move; returns s, t,
+    the gaps left, and the sines of the angles.
 
     Where the tangents are nearly parallel a damped Gauss-Newton step takes over, which goes to the
     closest approach.
     """
-    cap = 0.25 * min(a.length, b.length)
+    s, t, going = s.copy(), t.copy(), np.arange(len(s))
+    cap, still = 0.25 * np.minimum(lengths[a], lengths[b]), 1e-15 * (lengths[a] + lengths[b])
     for _ in range(_NEWTON):
-        gap, p, q = a.position(s) - b.position(t), a.tangent(s), b.tangent(t)
-        det = q[:, 0] * p[:, 1] - q[:, 1] * p[:, 0]
-        singular = np.abs(det) < _NEAR_SINGULAR
-        pq = np.sum(p * q, axis=1)
-        damping = 1.0 + 1e-8
-        along = np.stack([np.sum(p * gap, axis=1), -np.sum(q * gap, axis=1)], axis=1)
-        normal = damping**2 - pq**2
-        ds = np.where(
-            singular,
-            -(damping * along[:, 0] + pq * along[:, 1]) / normal,
-            (gap[:, 0] * q[:, 1] - gap[:, 1] * q[:, 0]) / np.where(singular, 1.0, det),
+        (x, p), (y, q) = (
+            _frames(curves, which[going], at[going]) for which, at in ((a, s), (b, t))
         )
-        dt = np.where(
-            singular,
-            -(damping * along[:, 1] + pq * along[:, 0]) / normal,
-            (gap[:, 0] * p[:, 1] - gap[:, 1] * p[:, 0]) / np.where(singular, 1.0, det),
-        )
-        scale = np.minimum(1.0, cap / np.maximum(np.maximum(np.abs(ds), np.abs(dt)), 1e-300))
-        s, t = s + scale * ds, t + scale * dt
-        if np.all(np.maximum(np.abs(ds), np.abs(dt)) <= 1e-15 * (a.length + b.length)):
+        ds, dt = _newton_step(x - y, p, q)
+        longest = np.maximum(np.abs(ds), np.abs(dt))
+        scale = np.minimum(1.0, cap[going] / np.maximum(longest, 1e-300))
+        s[going] += scale * ds
+        t[going] += scale * dt
+        going = going[longest > still[going]]
+        if not len(going):
             break
-    gap, p, q = a.position(s) - b.position(t), a.tangent(s), b.tangent(t)
-    return s, t, np.hypot(*gap.T), q[:, 0] * p[:, 1] - q[:, 1] * p[:, 0]
+    (x, p), (y, q) = _frames(curves, a, s), _frames(curves, b, t)
+    return s, t, np.hypot(*(x - y).T), q[:, 0] * p[:, 1] - q[:, 1] * p[:, 0]
 
 
-def _on(curve: Curve, s: np.ndarray, margin: float) -> np.ndarray:
-    """Whether stations lie on the curve, its ends' surroundings included."""
-    return np.full(len(s), True) if curve.closed else (s >= -margin) & (s <= curve.length + margin)
+def _newton_step(gap: np.ndarray, p: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Steps (n,), (n,) along tangents p and q (n, 2) that close the gaps (n, 2)."""
+    det = q[:, 0] * p[:, 1] - q[:, 1] * p[:, 0]
+    singular = np.abs(det) < _NEAR_SINGULAR
+    safe = np.where(singular, 1.0, det)
+    pq, damping = np.sum(p * q, axis=1), 1.0 + 1e-8
+    along = np.sum(p * gap, axis=1), -np.sum(q * gap, axis=1)
+    normal = damping**2 - pq**2
+    ds = (gap[:, 0] * q[:, 1] - gap[:, 1] * q[:, 0]) / safe
+    dt = (gap[:, 0] * p[:, 1] - gap[:, 1] * p[:, 0]) / safe
+    return (
+        np.where(singular, -(damping * along[0] + pq * along[1]) / normal, ds),
+        np.where(singular, -(damping * along[1] + pq * along[0]) / normal, dt),
+    )
 
 
-def _clip(curve: Curve, s: np.ndarray) -> np.ndarray:
-    """Stations on the curve; a loop's within one lap."""
-    return np.mod(s, curve.length) if curve.closed else np.clip(s, 0.0, curve.length)
+def _on(closed: np.ndarray, length: np.ndarray, s: np.ndarray, margin: float) -> np.ndarray:
+    """Whether stations lie on their curves, the ends' surroundings included."""
+    return closed | (s >= -margin) & (s <= length + margin)
 
 
-def _distinct(curves, pair, s: np.ndarray, t: np.ndarray, margin: float) -> list[Crossing]:
-    """Crossings without the repetitions that neighbouring pieces find."""
-    a, b = pair
-    found: list[Crossing] = []
-    positions = 0.5 * (curves[a].position(s) + curves[b].position(t))
-    for k in np.argsort(s, kind="stable"):
-        if all(np.hypot(*(positions[k] - other.position)) > margin for other in found):
-            found.append(Crossing((a, b), (float(s[k]), float(t[k])), positions[k]))
-    return found
+def _clip(closed: np.ndarray, length: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """Stations on the curves; a loop's within one lap."""
+    return np.where(closed, np.mod(s, length), np.clip(s, 0.0, length))
 
 
-def _refuse_self_crossing(curve: Curve, chords: _Chords) -> None:
-    """Raise InputError when two pieces that aren't neighbours meet."""
-    n = len(chords.start)
-    i, j = np.nonzero(np.triu(_boxes_meet(chords, chords, 0.0), 2))
-    if curve.closed:
-        apart = (i > 0) | (j < n - 1)
-        i, j = i[apart], j[apart]
-    start, end = chords.start, chords.end
+def _refuse_self_crossing(
+    curves: Sequence[Curve], pieces: _Pieces, i: np.ndarray, j: np.ndarray
+) -> None:
+    """Raise InputError when two pieces i < j of one curve meet that aren't neighbours."""
+    of = pieces.curve[i]
+    closed = np.array([curve.closed for curve in curves])[of]
+    around = closed & (i == pieces.first[of]) & (j == pieces.first[of + 1] - 1)
+    apart = (j - i > 1) & ~around
+    i, j = i[apart], j[apart]
+    start, end = pieces.start, pieces.end
     over_i = _side(start[i], end[i], start[j]) + _side(start[i], end[i], end[j]) == 0
     over_j = _side(start[j], end[j], start[i]) + _side(start[j], end[j], end[i]) == 0
     crossing = np.flatnonzero(over_i & over_j)
     if len(crossing):
-        x = chords.start[i[crossing[0]]]
+        first = i[crossing].min()
+        x = start[first]
         raise InputError(
-            f"the curve crosses itself near ({x[0]:.6g}, {x[1]:.6g})", field=curve.field
+            f"the curve crosses itself near ({x[0]:.6g}, {x[1]:.6g})",
+            field=curves[pieces.curve[first]].field,
         )
 
 

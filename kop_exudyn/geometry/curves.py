@@ -70,6 +70,13 @@ class Curve(ABC):
         """Unit tangents (..., 2)."""
         return direction(self.angle(s))
 
+    def frame(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """`position` and `tangent` (n, 2) at s (n,), for the price of one of them."""
+        inside, _ = self._inside(s)
+        x, angle, _ = self._evaluate(inside)
+        tangent = direction(angle)
+        return x if self.closed else x + (s - inside)[:, None] * tangent, tangent
+
     def curvature(self, s: Any) -> np.ndarray:
         """Signed curvature (...), positive to the left; a polyline's vertices are left out."""
         s = np.asarray(s, float)

@@ -138,13 +138,13 @@ def network(
     first_family, opens = families(len(curves), points)
     pairs = np.array([c.curves for c in points])
     pairs = np.where(first_family[:, None], pairs, pairs[:, ::-1])
-    strands = tuple(_strand(curve, k, points, free_ends) for k, curve in enumerate(curves))
-    places = np.array(
-        [
-            [int(np.flatnonzero(strands[c].joints == n)[0]) for c in pair]
-            for n, pair in enumerate(pairs)
-        ]
-    )
+    along: list[list[tuple[float, int]]] = [[] for _ in curves]
+    for n, crossing in enumerate(points):
+        for curve, station in zip(crossing.curves, crossing.stations):
+            along[curve].append((station, n))
+    strands = tuple(_strand(curve, sorted(own), free_ends) for curve, own in zip(curves, along))
+    place = [{joint: k for k, joint in enumerate(s.joints.tolist())} for s in strands]
+    places = np.array([[place[c][n] for c in pair] for n, pair in enumerate(pairs.tolist())])
     return CurveNetwork(
         np.array([c.position for c in points]), pairs, places, strands, opens, size_of(curves)
     )
@@ -191,14 +191,8 @@ def middle_joint(positions: np.ndarray) -> int:
     return int(np.argmax(distances <= distances.min() + TOLERANCE * distances.max()))
 
 
-def _strand(curve: Curve, number: int, crossings: Sequence[Crossing], free_ends: bool) -> Strand:
-    """A curve's joints in order."""
-    own = [
-        (c.stations[c.curves.index(number)], n)
-        for n, c in enumerate(crossings)
-        if number in c.curves
-    ]
-    own.sort()
+def _strand(curve: Curve, own: Sequence[tuple[float, int]], free_ends: bool) -> Strand:
+    """A curve as the network uses it; own: stations and numbers of its joints, in order."""
     stations, joints = np.array([s for s, _ in own]), np.array([n for _, n in own])
     if curve.closed and len(own) < _LEAST_LOOP:
         raise InputError(

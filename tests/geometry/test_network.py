@@ -350,3 +350,28 @@ def test_a_tree_has_no_surface():
     )
     with pytest.raises(InputError, match="enclose no face"):
         triangulate(net)
+
+
+class TestLargeDrawings:
+    """Searches that look at every pair of pieces would need gigabytes and minutes for these."""
+
+    def test_laths_of_thousands_of_points(self):
+        t = np.linspace(-0.1, 3.1, 4000)
+        across = [Spline(np.stack([t, k + 0.05 * np.sin(t)], axis=1)) for k in range(3)]
+        upwards = [Spline(np.stack([np.full(4000, float(k)), t], axis=1)) for k in range(3)]
+        net = network([*across, *upwards])
+        wanted = [[x, k + 0.05 * np.sin(x)] for k in range(3) for x in range(3)]
+        np.testing.assert_allclose(net.joints, wanted, atol=1e-9)
+
+    def test_a_net_of_sixty_by_sixty(self):
+        lines = [Polyline([[-1, k], [60, k + 0.3]]) for k in range(60)]
+        lines += [Polyline([[k, -1], [k + 0.2, 61]]) for k in range(60)]
+        net = network(lines)
+        assert net.n_joints == 3600 and net.opens.all()
+        assert {len(strand.joints) for strand in net.strands} == {60}
+
+    def test_more_points_than_can_be_searched(self, monkeypatch):
+        monkeypatch.setattr("kop_exudyn.geometry.crossings._MOST_PIECES", 100)
+        waves = [[x, 0.1 * np.sin(x)] for x in np.linspace(0, 9, 200)]
+        with pytest.raises(InputError, match="curves: have 200 pieces .* at most 100 can be"):
+            network([Polyline(waves), Polyline([[1, -1], [1, 1]])])
