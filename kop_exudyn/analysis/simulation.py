@@ -83,6 +83,9 @@ class SimulationResult:
             "elastic_energy": final.elastic_energy,
             "stable": final.stable,
             "opening_angle": final.opening,
+            "assembly_angle": next(
+                (role.opening for role in self.design.roles if not role.fitted), None
+            ),
             "exudyn": self.confirmations[self.design.fitted_role.name].to_dict(),
             "fit": fit_summary(self.design, self.design.target, self.fit, final.state),
             "displaced_percent": self.displaced_percent,

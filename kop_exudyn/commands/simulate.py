@@ -113,7 +113,9 @@ def _summary(result: dict, units: Units | None) -> str:
         )
     if result["opening_angle"] is not None:
         angle = result["opening_angle"]
-        rows["opening angle"] = f"{angle:.4g} rad, {math.degrees(angle):.4g}°"
+        rows["opening angle"] = f"{angle:.4g} rad, {math.degrees(angle):.4g}° in the mean"
+        if result["assembly_angle"] is not None:
+            rows["opening angle"] += f", from {math.degrees(result['assembly_angle']):.4g}°"
     rows |= {
         f"stress, {role}": _stress(strength, units) for role, strength in result["strength"].items()
     }

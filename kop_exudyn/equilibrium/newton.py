@@ -307,11 +307,14 @@ class _Run:
             self._check_budget()
             self.shift, border = factorise_convex(system, max(floor, self.shift / 16))
             shifted = shifted + 1 if self.shift > floor else 0
-            if shifted > _LINGERING and self.relative(residual) < _NEAR and self._unstable_here():
-                # symmetry keeps the residual off the unstable mode, whose shift makes the other
-                # modes converge slowly
-                best, since, shifted = None, 0, 0
-                continue
+            if shifted > _LINGERING and self.relative(residual) < _NEAR:
+                if self._unstable_here():
+                    # symmetry keeps the residual off the unstable mode, whose shift makes the other
+                    # modes converge slowly
+                    best, since, shifted = None, 0, 0
+                    continue
+                # the look at the stability has factorised the unshifted matrix
+                self.shift, border = factorise_convex(system, self.shift)
             step, change = bordered_solve(system, border, -residual, -gap)
             scale = self._capped(step, cap)
             # without a potential nothing tells whether a shortened step leads ahead: a roll-up

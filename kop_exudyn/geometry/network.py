@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -13,6 +13,8 @@ from ..errors import InputError
 from .crossings import TOLERANCE, Crossing, find_crossings, given_crossings, size_of
 from .curves import Curve, curve_from_dict, direction
 
+_RIGHT = np.radians(0.5)  # means of angles this close to 90 degrees count as right ones
+_EQUAL = 1e-3  # mean difference of directions (their doubled cosines) that tells nothing
 _LEAST_LOOP = 3  # joints: two corners can't close a loop of straight pieces
 
 
@@ -109,8 +111,8 @@ class CurveNetwork:
 
     @property
     def opening_angles(self) -> np.ndarray:
-        """(n,) angle from the first to the second curve in (0, pi), whichever way round the curves
-        are drawn."""
+        """(n,) angle from the first to the second curve, counter-clockwise, in (0, pi), whichever
+        way round the curves are drawn."""
         return np.mod(self.directions[:, 1] - self.directions[:, 0], np.pi)
 
 
@@ -118,11 +120,15 @@ def network(
     curves: Sequence[Curve],
     crossings: str | Sequence[Mapping[str, Any]] = "find",
     free_ends: bool = False,
+    *,
+    acute: bool = False,
 ) -> CurveNetwork:
     """Join curves where they cross.
 
     crossings : "find" for all there are, or a list as for `crossings.given_crossings`
     free_ends : whether curves go on beyond their first and last joint
+    acute : whether the first family is chosen by the shape of the net (see `acute_first`), so that
+        the order in which the curves are given tells nothing; otherwise it is that of the first one
 
     Raises InputError, naming the curve, where no structure comes of it: a curve that crosses no
     other, crosses itself, touches or overlaps another, three curves through one point, parts that
@@ -145,15 +151,59 @@ def network(
     strands = tuple(_strand(curve, sorted(own), free_ends) for curve, own in zip(curves, along))
     place = [{joint: k for k, joint in enumerate(s.joints.tolist())} for s in strands]
     places = np.array([[place[c][n] for c in pair] for n, pair in enumerate(pairs.tolist())])
-    return CurveNetwork(
+    found = CurveNetwork(
         np.array([c.position for c in points]), pairs, places, strands, opens, size_of(curves)
     )
+    return acute_first(found) if acute else found
 
 
 def network_from_dict(data: Mapping[str, Any]) -> CurveNetwork:
-    """The network of a design file's fields `curves`, `crossings` and `free_ends`."""
+    """The network of a design file's fields `curves`, `crossings` and `free_ends`.
+
+    Up to version 1 of the files the first curve was of the first family, whatever the shape.
+    """
     curves = [curve_from_dict(entry, f"curves[{k}]") for k, entry in enumerate(data["curves"])]
-    return network(curves, data.get("crossings", "find"), bool(data.get("free_ends", False)))
+    return network(
+        curves,
+        data.get("crossings", "find"),
+        bool(data.get("free_ends", False)),
+        acute=data.get("version", 1) > 1,
+    )
+
+
+def acute_first(network: CurveNetwork) -> CurveNetwork:
+    """The same network, its opening measured across the acute angles of the whole net.
+
+    The opening angle of a joint is that from the first family of curves to the second one, counter-
+    clockwise. Of the two families the first one is that from which the mean angle is below 90
+    degrees; so laths that turn towards each other close, and a positive opening opens the narrow
+    sectors. Where the mean is 90 degrees (to half a degree), the first family is the one that runs
+    rather along x; of nets that don't run either way, the one that runs rather along the diagonal
+    x = y; of those that don't either, the longer one.
+    """
+    if not network.opens.any():
+        return network
+    mean = float(network.opening_angles[network.opens].mean())
+    if mean < 0.5 * np.pi - _RIGHT:
+        return network
+    if mean > 0.5 * np.pi + _RIGHT or _second_leads(network):
+        return replace(network, pairs=network.pairs[:, ::-1], places=network.places[:, ::-1])
+    return network
+
+
+def _second_leads(network: CurveNetwork) -> bool:
+    """Whether the second family comes first among families at right angles."""
+    twice = 2 * network.directions[network.opens]
+    lengths = [
+        sum(network.strands[c].curve.length for c in np.unique(network.pairs[network.opens, side]))
+        for side in (0, 1)
+    ]
+    lead = [
+        float(np.diff(np.cos(twice), axis=1).mean()),
+        float(np.diff(np.sin(twice), axis=1).mean()),
+        (lengths[1] - lengths[0]) / network.size,
+    ]
+    return next((value > 0 for value in lead if abs(value) > _EQUAL), False)
 
 
 def families(n_curves: int, crossings: Sequence[Crossing]) -> tuple[np.ndarray, np.ndarray]:

@@ -17,7 +17,7 @@ from ..structures.umbrella.design import Umbrella
 from ..structures.umbrella.release import is_release
 from ..units import common_units
 
-DESIGN_VERSION = 1
+DESIGN_VERSION = 2
 _SUFFIXES = (".json", ".json.gz")
 
 

@@ -12,6 +12,7 @@ from kop_exudyn.io.kits import load_kit
 from kop_exudyn.io.results import load_result
 
 READERS = {"design": load_design, "kit": load_kit, "result": load_result, "job": Job.load}
+NEWEST = {"design": 2, "kit": 1, "result": 1, "job": 1}
 
 
 @pytest.mark.parametrize("name", READERS)
@@ -19,8 +20,8 @@ READERS = {"design": load_design, "kit": load_kit, "result": load_result, "job":
     "version, message",
     [
         (
-            2,
-            r"version = 2: written for a newer kop_exudyn; this one reads versions up to 1: "
+            3,
+            r"version = 3: written for a newer kop_exudyn; this one reads versions up to {}: "
             r"upgrade with pip",
         ),
         (0, r"version = 0: unknown version; this kop_exudyn reads 1"),
@@ -35,7 +36,7 @@ def test_versions_that_cannot_be_read(name, version, message, write_json_file):
     path = write_json_file(
         "file.json", {"format": f"kop_exudyn/{name}", "version": version, "rest": 1}
     )
-    with pytest.raises(InputError, match=message) as caught:
+    with pytest.raises(InputError, match=message.format(NEWEST[name])) as caught:
         READERS[name](path)
     assert str(caught.value).startswith(f"{path}: version = ")
 

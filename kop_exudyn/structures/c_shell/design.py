@@ -25,6 +25,7 @@ from scipy.spatial import Delaunay
 from ...equilibrium.newton import Equilibrium, NewtonOptions, Start, solve
 from ...equilibrium.system import System
 from ...errors import InputError, SimulationFailure
+from ...geometry.linkage import refuse_loose_parts
 from ...geometry.network import CurveNetwork, network_from_dict
 from ...geometry.network_faces import triangulate
 from ...geometry.triangles import TriangleSurface
@@ -32,6 +33,7 @@ from ...rods.sections import material_from_dict, section_from_dict
 from ...scene.scene import Scene
 from ..base import Design, Role, Target, register
 from ..mesh_target import load_target_mesh, target_on_mesh
+from .opening import check_hinges, check_opening
 from .scene import RodModel, lay_out, shell_scene
 
 _OPENING_STEP = 0.1  # rad of mean joint angle a step
@@ -78,9 +80,11 @@ class CShell(Design):
             self.layout.joints,
         )
         self.lower, self.upper = numbering.bounds(_LARGEST_CORNER)
+        refuse_loose_parts(network)
         self._triangles = triangulate(network)
         flat, straight = self.layout.hinges[:, network.opens].mean(axis=1)
         self.flat_angle = float(flat)
+        check_opening(self.flat_angle, opening)
         self.roles = (
             Role("deployed", self.flat_angle + opening, fitted=True),
             Role("rest", float(straight)),
@@ -112,7 +116,13 @@ class CShell(Design):
     def smooth_path(self) -> list[Equilibrium]:
         """The smooth design's equilibria from the flat network to the opening, in steps of about
         0.1 rad."""
-        return open_up(System(self.smooth), self.flat_angle, self.opening, self.side)
+        path = open_up(System(self.smooth), self.flat_angle, self.opening, self.side)
+        try:
+            for equilibrium in path:
+                check_hinges(self.network, equilibrium.state)
+        except SimulationFailure as failure:
+            raise failure.within("smooth design") from None
+        return path
 
     def deploy(self, q: np.ndarray | None = None) -> dict[str, Equilibrium]:
         """Deployed from the smooth design's deployed state (the same branch), rest from the flat
@@ -131,6 +141,7 @@ class CShell(Design):
                 found[role.name] = solve(
                     self.systems[role.name], q, starts[role.name], role.opening
                 )
+                check_hinges(self.network, found[role.name].state)
             except SimulationFailure as failure:
                 raise failure.within(f"{role.name} state") from None
         return {**found, "deployed": found["deployed"].after(*path)}
