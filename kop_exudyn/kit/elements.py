@@ -72,6 +72,25 @@ class KindElements:
         ends = np.cumsum([len(block.values) for block in self.blocks]).tolist()
         return [slice(start, end) for start, end in zip([0, *ends], ends)]
 
+    @property
+    def numbers(self) -> np.ndarray | None:
+        """(n,) numbers whose clustering is that of the elements; None for kinds of another sort.
+
+        Parts that can be built in with either sign, and are none below zero, serve sizes.
+        """
+        if self.kind.n_parameters > 1 or not self.exact or np.any(self.penalty):
+            return None
+        found = []
+        for block in self.blocks:
+            signs = set(block.variants.matrices.ravel().tolist())
+            both = signs == {1.0, -1.0}
+            if block.values.shape[1] > 1 or not (both or signs == {1.0}):
+                return None
+            if both and self.kind.lower[0] < 0:
+                return None
+            found.append(np.abs(block.values[:, 0]) if both else block.values[:, 0])
+        return np.concatenate(found)
+
     def nearest(self, parts: np.ndarray) -> Labels:
         """Nearest part (m, k_p) and variant of each element; of equally near ones the first."""
         found = [_nearest_in_block(block, parts) for block in self.blocks]

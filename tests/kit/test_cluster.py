@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from kop_exudyn.errors import InputError
 from kop_exudyn.kit.assign import nearest
-from kop_exudyn.kit.cluster import best_parts, cluster, lloyd
+from kop_exudyn.kit.cluster import best_parts, cluster, lloyd, swapped
 from kop_exudyn.kit.elements import collect
 from kop_exudyn.kit.groups import ElementGroup
 
@@ -225,3 +225,18 @@ def test_unusable_parameters():
         cluster(groups, q, {"linear": 1})
     with pytest.raises(InputError, match="negative"):
         collect(groups, np.ones(8), penalties={"linear": (-1, 0)})
+
+
+def test_swaps_leave_a_local_minimum_of_k_means():
+    # three tight heaps, two parts in the first and one between the others: k-means stays there
+    heaps = np.repeat([[1.0, 1.0], [2.0, 2.0], [2.4, 2.4]], 6, axis=0)
+    q = (heaps + np.random.default_rng(0).normal(0, 0.01, heaps.shape)).ravel()
+    groups = [ElementGroup("linear", np.arange(len(q)).reshape(-1, 2))]
+    elements = collect(groups, q)["linear"]
+    limits = elements.kind.bounds(None)
+    stuck = lloyd(elements, np.array([[0.99, 1.0], [1.0, 1.01], [2.2, 2.2]]), *limits)
+    parts, labels = swapped(elements, *stuck, limits)
+    assert elements.energy(parts, labels) < 0.05 * elements.energy(*stuck)
+    np.testing.assert_allclose(np.sort(parts.mean(axis=1)), [1.0, 2.0, 2.4], atol=0.02)
+    again = swapped(elements, parts, labels, limits)
+    assert elements.energy(*again) == elements.energy(parts, labels)
