@@ -11,6 +11,7 @@ import numpy as np
 
 from ..equilibrium.newton import Equilibrium, Start, solve
 from ..errors import InputError, SimulationFailure
+from ..kit.optimality import ClusteringGap
 from ..kit.parts import Assignment, Kit
 from ..scene.state import State
 from ..search.events import events_from_list
@@ -68,6 +69,9 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
         wall_s=data["wall_s"],
         peak_memory_mb=data["peak_memory_mb"],
         events=_history(data, path),
+        clustering={
+            k: ClusteringGap.from_dict(gap) for k, gap in data.get("clustering", {}).items()
+        },
     )
     for stage in STAGES:
         outcomes = [

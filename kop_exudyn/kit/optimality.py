@@ -8,7 +8,7 @@ projection energy may well build better ones.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,6 +48,11 @@ class ClusteringGap:
             "gap_percent": self.gap_percent,
             "exact": self.exact,
         }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> ClusteringGap:
+        """What `to_dict` wrote."""
+        return cls(data["energy"], data["bound"], data["exact"])
 
 
 def clustering_gaps(

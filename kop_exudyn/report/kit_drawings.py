@@ -10,6 +10,7 @@ from ..equilibrium.newton import Equilibrium
 from ..errors import SimulationFailure
 from ..kit.groups import ElementGroup
 from ..kit.kinds import part_kind
+from ..kit.optimality import ClusteringGap
 from ..search.objective import Evaluation
 from ..search.result import INPUT, REDEPLOYED, STAGES, KitResult
 from ..structures.base import Design
@@ -188,12 +189,24 @@ def remarks(result: KitResult) -> list[str]:
         _about_strength(design.name, result.summary("assigned", n))
         for n, design in enumerate(result.designs)
     ]
+    found += [_about_clustering(kind, gap) for kind, gap in result.clustering.items()]
     found = [remark for remark in found if remark]
     return found + [
         f"The {name} stage ended after {stage.steps} steps: {stage.status}."
         for name, stage in stages.items()
         if stage.status
     ]
+
+
+def _about_clustering(kind: str, gap: ClusteringGap) -> str:
+    """How good the parts are that the search began with."""
+    if gap.exact and gap.gap_percent < 0.01:
+        return f"The {kind} parts that the search began with are the best clustering of the inputs."
+    return (
+        f"The {kind} parts that the search began with are within {gap.gap_percent:.1f} % of the "
+        f"projection energy of the best clustering of the inputs (proven; it says nothing of the "
+        f"designs built from them)."
+    )
 
 
 def _about_opening(name: str, opened: Mapping, kept: Mapping) -> str:

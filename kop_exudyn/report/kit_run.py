@@ -92,6 +92,7 @@ def optimize_kit(
         outcome.peak_memory_mb,
         described | {"jobs": settings.jobs},
         outcome.redeployed,
+        outcome.clustering,
     )
     write_kit_report(result, folder.path)
     return result

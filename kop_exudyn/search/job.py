@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ..errors import SimulationFailure
+from ..kit.optimality import ClusteringGap, clustering_gaps
 from ..kit.parts import Kit
 from ..structures.base import Design
 from .assigned import in_rounds, that_open
@@ -45,6 +46,8 @@ class JobOutcome:
     redeployed : by design, the state in which the assigned parts end when they are opened from
         their flat (or compact) assembly, not led there from the relaxed design: bending-active
         structures have several stable states
+    clustering : by kind, how far the parts of the direct stage are from the best clustering of the
+        input elements
     equilibria, newton_iterations : solved in all
     peak_memory_mb : of this process and its workers together
     """
@@ -52,6 +55,7 @@ class JobOutcome:
     references: list[Reference]
     stages: dict[str, StageResult] = field(default_factory=dict)
     redeployed: list[Evaluation | SimulationFailure] = field(default_factory=list)
+    clustering: dict[str, ClusteringGap] = field(default_factory=dict)
     equilibria: int = 0
     newton_iterations: int = 0
     peak_memory_mb: float = 0.0
@@ -98,6 +102,13 @@ def run_job(
         if settings.stages.redeployments:
             found["assigned"] = that_open(stages, found["assigned"], fixed_kit=kit is not None)
         outcome.redeployed = stages.redeployed(found["assigned"])
+        announce("bound on the clustering")
+        outcome.clustering = clustering_gaps(
+            dataset.groups,
+            dataset.parameters,
+            found["direct"].kit,
+            bounds=settings.stages.bounds,
+        )
         outcome.peak_memory_mb = pool.peak_memory_mb()
         outcome.equilibria, outcome.newton_iterations = (
             dataset.tally.equilibria,

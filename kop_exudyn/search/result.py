@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import SimulationFailure
+from ..kit.optimality import ClusteringGap
 from ..kit.parts import Assignment, Kit
 from ..structures.base import Design
 from ..structures.deviation import fit_summary
@@ -33,6 +34,8 @@ class KitResult:
     events : accepted steps of all SQPs, in order
     redeployed : by design, the state that the assigned parts open into by themselves; empty where
         it wasn't computed
+    clustering : by kind, how far the parts that the search began with are from the best clustering
+        of the input elements
     equilibria, newton_iterations : solved in all
     settings : as given, for the record
     """
@@ -47,6 +50,7 @@ class KitResult:
     peak_memory_mb: float = 0.0
     settings: Mapping[str, Any] = field(default_factory=dict)
     redeployed: Sequence[Evaluation | SimulationFailure] = ()
+    clustering: Mapping[str, ClusteringGap] = field(default_factory=dict)
 
     @property
     def units(self) -> Units | None:
@@ -117,6 +121,7 @@ class KitResult:
             ],
             "kit": {kind: _plain(parts) for kind, parts in self.kit.parts.items()},
             "assignment": self.assignment.to_dict(),
+            "clustering": {kind: gap.to_dict() for kind, gap in self.clustering.items()},
             "steps": {
                 stage: self.stages[stage].steps
                 for stage in ("relaxed", "assigned", "unrelaxed")

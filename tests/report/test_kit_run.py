@@ -134,6 +134,11 @@ def test_result_file(finished):
     assert (len(data["kit"]["linear"]), len(data["kit"]["angular"])) == (3, 2)
     assert data["settings"]["parts"] == {"linear": 3, "angular": 2}
     assert data["peak_memory_mb"] > 0
+    gaps = data["clustering"]
+    assert set(gaps) == {"linear", "angular"} and gaps["angular"]["exact"]
+    assert gaps["angular"]["gap_percent"] == pytest.approx(0, abs=1e-6)
+    for gap in gaps.values():
+        assert 0 < gap["bound"] <= gap["energy"]
     strength = data["designs"][0]["assigned"]["strength"]
     # no sections
     assert strength == {
@@ -167,6 +172,7 @@ def test_the_page_names_designs_and_settings(finished):
         "2 angular",
         "relaxed_steps",
         "exudyn",
+        "angular parts that the search began with are the best clustering of the inputs",
     ):
         assert piece in page
 
