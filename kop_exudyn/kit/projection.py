@@ -89,19 +89,31 @@ class Projection:
     def with_weight(self, weight: float) -> Projection:
         return replace(self, weight=weight)
 
-    def minimise(self, q: np.ndarray, kit: Kit, fixed_kit: bool = False) -> ProjectionMinimum:
-        """Best parts and assignment for q (n_q,), alternating from `kit`; with `fixed_kit` the
-        assignment alone."""
+    def minimise(self, q: np.ndarray, kit: Kit) -> ProjectionMinimum:
+        """Best parts and assignment for q (n_q,), alternating from `kit`."""
         elements = self._elements(q)
-        parts, labels = {}, {}
-        for name, e in elements.items():
-            if fixed_kit:
-                parts[name], labels[name] = kit[name], e.nearest(kit[name])
-            else:
-                parts[name], labels[name] = lloyd(e, kit[name], *e.kind.bounds(self.bounds))
+        found = {
+            name: lloyd(e, kit[name], *e.kind.bounds(self.bounds)) for name, e in elements.items()
+        }
+        parts = {name: parts for name, (parts, _) in found.items()}
+        labels = {name: labels for name, (_, labels) in found.items()}
+        return self._minimum(q, Kit({**kit.parts, **parts}, kit.units), elements, labels)
+
+    def assign(self, q: np.ndarray, kit: Kit) -> ProjectionMinimum:
+        """Best assignment for q (n_q,) to the parts of a kit that stays as it is."""
+        elements = self._elements(q)
+        labels = {name: e.nearest(kit[name]) for name, e in elements.items()}
+        return self._minimum(q, kit, elements, labels)
+
+    def _minimum(
+        self,
+        q: np.ndarray,
+        kit: Kit,
+        elements: dict[str, KindElements],
+        labels: dict[str, np.ndarray],
+    ) -> ProjectionMinimum:
         assignment = to_assignment(self.groups, len(q), elements, labels)
-        found = Kit({**kit.parts, **parts}, kit.units)
-        return ProjectionMinimum(found, assignment, self.energy(q, found, assignment))
+        return ProjectionMinimum(kit, assignment, self.energy(q, kit, assignment))
 
     def energy(self, q: np.ndarray, kit: Kit, assignment: Assignment) -> float:
         """The energy for this kit and assignment."""

@@ -12,8 +12,8 @@ import numpy as np
 
 from ..errors import SimulationFailure
 from .objective import DesignDerivatives, Evaluation
-from .reassign import LocalModel, Reassignment, reassign
-from .stage_results import SAME_STATE, StageResult, distance, mixed
+from .reassign import LocalModel, MoveParts, Reassignment, best_parts, keep_parts, reassign
+from .stage_results import SAME_STATE, StageResult, combined, distance
 from .stages import Stages
 
 log = logging.getLogger(__name__)
@@ -39,10 +39,9 @@ _WORTHWHILE = 0.97
 _Trial = tuple[StageResult, Reassignment, float]
 
 
-def in_rounds(
+def assigned_stage(
     stages: Stages,
     start: StageResult,
-    fixed_kit: bool = False,
     numbers: Iterator[int] | None = None,
 ) -> StageResult:
     """Reassign and optimise in turns until neither gains, from a state in which every element is
@@ -52,20 +51,19 @@ def in_rounds(
     parts than the model can be trusted with, so that J rises at first; of where the rounds lead
     from there the better one is kept (iterated local search: Lourenço, Martin, Stützle 2003).
 
-    fixed_kit : keep the parts (projection onto an existing kit), only the assignment changes
     numbers : of the rounds, where this isn't the first call: every SQP has a name of its own
     """
     settings = stages.settings
     if settings.reassignments == 0:
         name = "assigned" if numbers is None else f"assigned-{next(numbers)}"
-        return start if fixed_kit else stages.assigned(start, name)
-    rounds = _Rounds(stages, fixed_kit, numbers or count(1), start.steps)
-    best = rounds.settled(start, settings.reassignments)
+        return stages.assigned(start, name) if stages.rule.parts_move else start
+    rounds = _Rounds(stages, numbers or count(1), start.steps)
+    best = rounds.alternated(start, settings.reassignments)
     leaps = settings.leaps
     while leaps > 0 and best.value is not None:
-        for trial in _bold_trials(stages, best, fixed_kit)[:leaps]:
+        for trial in _bold_trials(stages, best)[:leaps]:
             leaps -= 1
-            landed = rounds.settled(rounds.landed(trial), _AFTER_LEAP)
+            landed = rounds.alternated(rounds.landed(trial), _AFTER_LEAP)
             log.info("a leap ends at J = %.5g, from %.5g", _value(landed), best.value)
             if _value(landed) < best.value:
                 leaps = leaps if rounds.worthwhile(best, landed) else 0
@@ -76,7 +74,7 @@ def in_rounds(
     return replace(rounds.polished(best), steps=rounds.steps, jumps=start.jumps)
 
 
-def that_open(stages: Stages, start: StageResult, fixed_kit: bool = False) -> StageResult:
+def opened_stage(stages: Stages, start: StageResult) -> StageResult:
     """Designs that open into their shape by themselves, or nearly: rounds from where they open
     into, again and again.
 
@@ -102,7 +100,7 @@ def that_open(stages: Stages, start: StageResult, fixed_kit: bool = False) -> St
         opened = stages.confirmed(opened)
         if opened.value is None:
             break
-        result = in_rounds(stages, opened, fixed_kit, numbers)
+        result = assigned_stage(stages, opened, numbers)
     return replace(best, jumps=start.jumps)
 
 
@@ -112,15 +110,14 @@ class _Rounds:
     included)."""
 
     stages: Stages
-    fixed_kit: bool
     numbers: Iterator[int]
     steps: int
 
-    def settled(self, best: StageResult, rounds: int) -> StageResult:
+    def alternated(self, best: StageResult, rounds: int) -> StageResult:
         """Reassigned and optimised in so many rounds at most, as long as they gain."""
         for number in range(rounds):
-            result = _many_reassigned(self.stages, best, self.fixed_kit)
-            if result is best and (self.fixed_kit or number > 0):
+            result = _many_reassigned(self.stages, best)
+            if result is best and (number > 0 or not self.stages.rule.parts_move):
                 break
             result = self._optimised(result)
             last, best = best, min((best, result), key=_value)
@@ -148,7 +145,7 @@ class _Rounds:
     def _optimised(
         self, result: StageResult, max_steps: int | None = None, tolerance: float | None = None
     ) -> StageResult:
-        if self.fixed_kit:
+        if not self.stages.rule.parts_move:
             return result
         settings = self.stages.settings
         result = self.stages.assigned(
@@ -169,11 +166,11 @@ def _all_same(stages: Stages, led: StageResult, opened: StageResult) -> bool:
     )
 
 
-def _many_reassigned(stages: Stages, best: StageResult, fixed_kit: bool) -> StageResult:
+def _many_reassigned(stages: Stages, best: StageResult) -> StageResult:
     """Reassigned again and again while that alone gains: each time costs less than the SQP that
     follows."""
     for _ in range(_REPEATS):
-        trial = _best_trial(stages, best, fixed_kit)
+        trial = _best_trial(stages, best)
         if trial is None:
             break
         enough = _value(trial) > _WORTHWHILE * _value(best)
@@ -183,14 +180,14 @@ def _many_reassigned(stages: Stages, best: StageResult, fixed_kit: bool) -> Stag
     return best
 
 
-def _best_trial(stages: Stages, best: StageResult, fixed_kit: bool) -> StageResult | None:
+def _best_trial(stages: Stages, best: StageResult) -> StageResult | None:
     """The best of several reassignments, None where none is worth an SQP (with a fixed kit: none is
     better)."""
     if best.value is None:  # a design failed: there is no model of it
         return None
     derivatives = stages.dataset.derivatives(best.evaluations, hessian=True)
     trials = [_each_its_own(stages, best, derivatives)]
-    if not fixed_kit:
+    if stages.rule.parts_move:
         trials += _together(stages, best, derivatives)
     found = [trial for trial in trials if trial is not None]
     if not found or _value(trial := min(found, key=_value)) >= _PATIENCE * best.value:
@@ -204,12 +201,12 @@ def _each_its_own(
 ) -> StageResult | None:
     """With the parts as they are the designs don't depend on each other: each takes the best of its
     trials, if any."""
-    results = [best, *(trial for trial, _, _ in _several(stages, best, derivatives, True))]
+    results = [best, *(trial for trial, _, _ in _several(stages, best, derivatives, keep_parts))]
     chosen = [min(results, key=lambda result: _share(result, n)) for n in range(len(best.designs))]
     return (
         None
         if all(result is best for result in chosen)
-        else stages.judged(mixed(chosen, stages.dataset))
+        else stages.judged(combined(chosen, stages.dataset))
     )
 
 
@@ -218,7 +215,7 @@ def _together(
 ) -> list[StageResult]:
     """Trials in which the parts move along; the best one also without the designs that the model
     was wrong about."""
-    found = _several(stages, best, derivatives, False)
+    found = _several(stages, best, derivatives, best_parts)
     if found:
         trial, changed, damping = min(found, key=lambda t: _value(t[0]))
         misled = _misled(stages, best, trial, changed)
@@ -228,13 +225,16 @@ def _together(
 
 
 def _several(
-    stages: Stages, best: StageResult, derivatives: Sequence[DesignDerivatives], fixed_kit: bool
+    stages: Stages,
+    best: StageResult,
+    derivatives: Sequence[DesignDerivatives],
+    move_parts: MoveParts,
 ) -> list[_Trial]:
     """The most cautious trials in which anything changes, up to one that is far off: bolder ones
     rarely are better."""
     found: list[_Trial] = []
     for damping in _DAMPINGS:
-        trial = _trial(stages, best, derivatives, damping, (), fixed_kit)
+        trial = _trial(stages, best, derivatives, damping, (), move_parts)
         found += [trial] if trial is not None else []
         if (
             len(found) == _TRIALS
@@ -245,13 +245,14 @@ def _several(
     return found
 
 
-def _bold_trials(stages: Stages, best: StageResult, fixed_kit: bool) -> list[StageResult]:
+def _bold_trials(stages: Stages, best: StageResult) -> list[StageResult]:
     """Some trials in which many elements change, however J takes it; the best one first."""
     derivatives = stages.dataset.derivatives(best.evaluations, hessian=True)
     fewest = max(2.0, _BOLD * sum(design.n_elements for design in stages.dataset.designs))
+    move_parts = best_parts if stages.rule.parts_move else keep_parts
     found: list[StageResult] = []
     for damping in _BOLD_DAMPINGS:
-        trial = _trial(stages, best, derivatives, damping, (), fixed_kit)
+        trial = _trial(stages, best, derivatives, damping, (), move_parts)
         if trial is not None and trial[1].changes >= fewest and trial[0].value is not None:
             found.append(trial[0])
         if len(found) == _TRIALS:
@@ -266,7 +267,7 @@ def _trial(
     derivatives: Sequence[DesignDerivatives],
     damping: float,
     frozen: Sequence[int] = (),
-    fixed_kit: bool = False,
+    move_parts: MoveParts = best_parts,
 ) -> _Trial | None:
     """The designs rebuilt of the parts that the model prefers; None where it prefers those that
     they have."""
@@ -275,7 +276,7 @@ def _trial(
         derivatives, dataset.design_weights, dataset.split(dataset.scales()), damping
     )
     found = reassign(
-        stages.assigned_problem(best, range(len(best.designs))), model, frozen, fixed_kit
+        stages.assigned_problem(best, range(len(best.designs))), model, frozen, move_parts
     )
     if found is None:
         return None
@@ -286,7 +287,7 @@ def _trial(
         "other parts for %d elements (damping %g%s): J = %.5g, predicted %.5g",
         found.changes,
         damping,
-        ", same kit" if fixed_kit else "",
+        ", same parts" if move_parts is keep_parts else "",
         _value(trial),
         best.value + found.predicted.sum(),
     )

@@ -9,7 +9,7 @@ from ..errors import SimulationFailure
 from ..kit.optimality import ClusteringGap, clustering_gaps
 from ..kit.parts import Kit
 from ..structures.base import Design
-from .assigned import in_rounds, that_open
+from .assigned import assigned_stage, opened_stage
 from .dataset import Dataset
 from .objective import Evaluation, Reference, Weights
 from .pool import DesignPool
@@ -84,23 +84,23 @@ def run_job(
         pool.prepare()
         weights = settings.weights or Weights.suiting(designs)
         dataset = Dataset.of_pool(pool, weights, settings.design_weights)
-        stages = Stages(dataset, parts, settings.stages, store, observer)
+        stages = Stages(dataset, parts if kit is None else kit, settings.stages, store, observer)
         outcome = JobOutcome(pool.references)
         found = outcome.stages
         announce("direct projection")
-        found["direct"] = stages.direct(kit)
+        found["direct"] = stages.direct()
         if settings.baselines and kit is None:
             announce("unrelaxed baseline")
             found["unrelaxed"] = stages.assigned(found["direct"], "unrelaxed")
         announce("relaxed stage")
-        relaxed = stages.relaxed(found["direct"].kit, fixed_kit=kit is not None)
+        relaxed = stages.relaxed(found["direct"].kit)
         announce("path to the parts")
-        found["relaxed"], at_parts = stages.to_parts(relaxed, fixed_kit=kit is not None)
+        found["relaxed"], at_parts = stages.to_parts(relaxed)
         announce("assigned stage")
-        found["assigned"] = in_rounds(stages, at_parts, fixed_kit=kit is not None)
+        found["assigned"] = assigned_stage(stages, at_parts)
         announce("deployment of the assigned designs")
         if settings.stages.redeployments:
-            found["assigned"] = that_open(stages, found["assigned"], fixed_kit=kit is not None)
+            found["assigned"] = opened_stage(stages, found["assigned"])
         outcome.redeployed = stages.redeployed(found["assigned"])
         announce("bound on the clustering")
         outcome.clustering = clustering_gaps(

@@ -12,8 +12,9 @@ from ..kit.kinds import Bounds
 from ..kit.parts import Assignment, Kit
 from ..kit.projection import Projection
 from ..sqp.constraints import LinearConstraints
-from ..sqp.problem import Derivatives, LiftedTerm, Point
+from ..sqp.problem import Derivatives, Point
 from .dataset import Dataset
+from .kit_rule import KitRule, SoughtKit
 from .objective import Evaluation
 
 
@@ -42,7 +43,7 @@ class RelaxedProblem:
     """J(q) = sum F(q) + P(q) over the parameters q of all elements; the kit follows q.
 
     constraints : on q, besides its bounds
-    fixed_kit : keep the kit (projection onto an existing one), only the assignment follows
+    rule : whether the kit follows the elements or is given
     """
 
     def __init__(
@@ -52,14 +53,10 @@ class RelaxedProblem:
         kit: Kit,
         bounds: Bounds | None = None,
         constraints: LinearConstraints | None = None,
-        fixed_kit: bool = False,
+        rule: KitRule | None = None,
     ):
-        self.dataset, self.projection, self.kit, self.fixed_kit = (
-            dataset,
-            projection,
-            kit,
-            fixed_kit,
-        )
+        self.dataset, self.projection, self.kit = dataset, projection, kit
+        self.rule: KitRule = rule if rule is not None else SoughtKit(kit.sizes)
         self.lower, self.upper = dataset.bounds(bounds)
         self.n = len(self.lower)
         self.constraints = (
@@ -75,7 +72,7 @@ class RelaxedProblem:
 
     def point(self, x: np.ndarray, evaluations: list[Evaluation], kit: Kit) -> Point:
         """The point of given evaluations, its kit found from a nearby one."""
-        nearest = self.projection.minimise(x, kit, self.fixed_kit)
+        nearest = self.rule.nearest(self.projection, x, kit)
         terms = _sum_terms(self.dataset, evaluations) | {"projection": nearest.energy}
         value = self.dataset.value(evaluations) + nearest.energy
         return Point(x, value, DatasetPoint(evaluations, nearest.kit, nearest.assignment, terms))
@@ -89,14 +86,10 @@ class RelaxedProblem:
         gradient = own + self.projection.gradient(point.x, data.kit, data.assignment)
         hessian = sp.block_diag([w * d.model for w, d in zip(weights, designs)], format="csc")
         quadratic = self.projection.hessian(point.x, data.kit, data.assignment)
-        if self.fixed_kit:
-            return Derivatives(gradient, sp.csc_matrix(hessian + sp.csc_matrix(quadratic.qq)))
-        used = np.flatnonzero(quadratic.pp.diagonal() > 0)  # a side that no element uses has no say
-        extra = LiftedTerm(
-            sp.csc_matrix(quadratic.qq),
-            sp.csc_matrix(sp.csc_matrix(quadratic.qp)[:, used]),
-            sp.csc_matrix(sp.csc_matrix(quadratic.pp)[used][:, used]),
-        )
+        added, extra = self.rule.model(quadratic)
+        if extra is None:
+            whole = hessian if added is None else sp.csc_matrix(hessian + added)
+            return Derivatives(gradient, whole)
         return Derivatives(gradient, hessian, extra, own)
 
     def first_derivatives(self, point: Point) -> Derivatives:

@@ -13,7 +13,7 @@ which is never higher than where it began.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numba as nb
@@ -82,6 +82,11 @@ class LocalModel:
         return [g + h @ (a - b) for g, h, a, b in zip(self.gradients, self.hessians, q, self.base)]
 
 
+# Gives the variables (n_p + k,) of a problem new values under the model; None where the constraints
+# can't be met.
+MoveParts = Callable[["AssignedProblem", np.ndarray, LocalModel], "np.ndarray | None"]
+
+
 @dataclass(frozen=True)
 class Reassignment:
     """Another kit and assignment, the parameters of no element to go with them (k,), what the model
@@ -95,14 +100,20 @@ class Reassignment:
 
 
 def reassign(
-    problem: AssignedProblem, model: LocalModel, frozen: Sequence[int] = (), fixed_kit: bool = False
+    problem: AssignedProblem,
+    model: LocalModel,
+    frozen: Sequence[int] = (),
+    move_parts: MoveParts | None = None,
 ) -> Reassignment | None:
-    """Improve the assignment of a problem, and unless `fixed_kit` its parts, under the model.
+    """Improve the assignment of a problem, and its parts, under the model.
 
-    frozen : designs whose elements keep their parts. Elements of kinds that realise intervals keep
-    theirs too. Returns None where no element gains by another part, or the constraints can't be met
-    with what it would get.
+    frozen : designs whose elements keep their parts
+    move_parts : `best_parts` (the default) moves the parts along, `keep_parts` leaves them
+
+    Elements of kinds that realise intervals keep their parts too. Returns None where no element
+    gains by another part, or the constraints can't be met with what it would get.
     """
+    move_parts = move_parts or best_parts
     before, vector = problem.assignment, problem.variables(np.concatenate(model.base))
     start = value = model.values(problem.dataset.split(problem.matrix @ vector)).sum()
     current = problem
@@ -112,7 +123,7 @@ def reassign(
             current = AssignedProblem(
                 problem.dataset, problem.kit, changed, problem.part_bounds, problem.of_elements
             )
-        moved = vector if fixed_kit else _best_parts(current, vector, model)
+        moved = move_parts(current, vector, model)
         if moved is None:
             return None
         vector, last = moved, value
@@ -204,7 +215,7 @@ def _descend(q, slope, hessian, indices, candidates, choice, least):
     return total
 
 
-def _best_parts(
+def best_parts(
     problem: AssignedProblem, vector: np.ndarray, model: LocalModel
 ) -> np.ndarray | None:
     """(n_p + k,) the variables that minimise m(M x) within bounds and constraints; None where these
@@ -233,3 +244,8 @@ def _best_parts(
     if result.status != "solved":
         return None if limits.rows else vector  # an indefinite model: the parts stay
     return np.clip(vector + result.x, problem.lower, problem.upper)
+
+
+def keep_parts(problem: AssignedProblem, vector: np.ndarray, model: LocalModel) -> np.ndarray:
+    """(n_p + k,) the variables as they are."""
+    return vector

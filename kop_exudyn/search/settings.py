@@ -25,10 +25,10 @@ class StageSettings:
         reassign.py), at most; a round that gains less than `reassigned_tolerance` of J is the last
     leaps : how often, after these rounds, many elements get other parts at once whatever J does,
         and two more rounds from there; what is no better is undone, and a gain below
-        `reassigned_tolerance` is the last, see `in_rounds`
+        `reassigned_tolerance` is the last, see `assigned_stage`
     redeployments : how often, after the assigned stage, the designs are opened from their assembly
         instead of led from the relaxed ones, and the stage goes on from where they end, see
-        `that_open` in rounds.py
+        `opened_stage` in assigned.py
     path_steps : steps of the watched path between the stages
     rescues : how often w_c is raised by ten when a design fails on that path, or snaps and there
         are no reassignments

@@ -116,7 +116,7 @@ def distance(design: Design, a: Evaluation, b: Evaluation) -> float:
     return float(np.linalg.norm(joints[0] - joints[1], axis=1).max()) / a.fit.diagonal
 
 
-def mixed(results: Sequence[StageResult], dataset: Dataset) -> StageResult:
+def combined(results: Sequence[StageResult], dataset: Dataset) -> StageResult:
     """Each design from its own result, all of the same kit; its objective is to be judged anew."""
     first = np.cumsum([0, *(len(design.groups) for design in dataset.designs)])
 

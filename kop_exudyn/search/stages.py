@@ -20,6 +20,7 @@ from ..sqp.history import SQPState
 from ..sqp.problem import Point
 from ..sqp.solver import SQPOptions, SQPResult, minimise
 from .dataset import Dataset, evaluations_from_arrays, evaluations_to_arrays
+from .kit_rule import rule_of
 from .objective import Evaluation
 from .problems import AssignedProblem, RelaxedProblem
 from .settings import StageSettings
@@ -50,12 +51,15 @@ Observer = Callable[[StageEvent], None]
 
 
 class Stages:
-    """Runs the stages for one dataset; interrupted SQPs go on from the store's checkpoints."""
+    """Runs the stages for one dataset; interrupted SQPs go on from the store's checkpoints.
+
+    parts : kind -> number of parts of a kit that is sought, or a kit that is given
+    """
 
     def __init__(
         self,
         dataset: Dataset,
-        parts: Mapping[str, int],
+        parts: Mapping[str, int] | Kit,
         settings: StageSettings = StageSettings(),
         store: Store | None = None,
         observer: Observer | None = None,
@@ -64,26 +68,16 @@ class Stages:
         self.schedule = settings.schedule or tuple(
             k * (weights.fit or weights.energy) for k in (0.1, 1.0, 10.0, 100.0)
         )
-        self.dataset, self.parts, self.settings = dataset, dict(parts), settings
+        self.dataset, self.rule, self.settings = dataset, rule_of(parts), settings
         self.store, self.observer = store or NoStore(), observer or (lambda event: None)
         self.q0 = dataset.parameters
         self.projection = Projection.of_inputs(dataset.groups, self.q0, bounds=settings.bounds)
 
-    def direct(self, kit: Kit | None = None) -> StageResult:
-        """Cluster the inputs (or take a kit), replace every element by its part."""
-        clustering = None
-        if kit is None:
-            clustering = cluster(
-                self.dataset.groups,
-                self.q0,
-                self.parts,
-                bounds=self.settings.bounds,
-                restarts=self.settings.restarts,
-                seed=self.settings.seed,
-            )
-            kit = clustering.kit
-        nearest = self.projection.minimise(self.q0, kit, fixed_kit=True)
-        assignment = clustering.assignment if clustering is not None else nearest.assignment
+    def direct(self) -> StageResult:
+        """Cluster the inputs (or take the given kit), replace every element by its part."""
+        kit, assignment = self.rule.first(
+            self.dataset.groups, self.q0, self.projection, self.settings
+        )
         return self.confirmed(self.built_from(kit, assignment, self.inputs()))
 
     def inputs(self) -> list[Evaluation]:
@@ -98,7 +92,6 @@ class Stages:
         self,
         kit: Kit,
         start: Sequence[Evaluation] | None = None,
-        fixed_kit: bool = False,
         name: str = "relaxed",
     ) -> StageResult:
         """Minimise over all elements, w_c raised until the clusters are tight; from the inputs or
@@ -106,9 +99,7 @@ class Stages:
         settings, evaluations = self.settings, list(start or self.inputs())
         steps, q = 0, np.concatenate([e.q for e in evaluations])
         for weight in self.schedule:
-            result, problem = self._relax(
-                f"{name}-{weight:g}", weight, q, evaluations, kit, fixed_kit
-            )
+            result, problem = self._relax(f"{name}-{weight:g}", weight, q, evaluations, kit)
             q, evaluations, kit = result.x, result.point.data.evaluations, result.point.data.kit
             steps += result.steps
             if (
@@ -220,9 +211,7 @@ class Stages:
         found = self.dataset.redeploy(q, range(len(result.designs)))
         return [found[n] for n in range(len(result.designs))]
 
-    def to_parts(
-        self, relaxed: StageResult, fixed_kit: bool = False
-    ) -> tuple[StageResult, StageResult]:
+    def to_parts(self, relaxed: StageResult) -> tuple[StageResult, StageResult]:
         """Follow the straight path from the relaxed elements to their parts, watching for snaps.
 
         When a design fails, w_c is raised and the relaxed stage goes on from where it was; also
@@ -230,7 +219,7 @@ class Stages:
         relaxed result that the path started from in the end, and the state at the parts.
         """
         settings = self.settings
-        attempts = settings.rescues + (0 if fixed_kit else settings.growth)
+        attempts = settings.rescues + self.rule.growth(settings)
         for attempt in range(attempts + 1):
             designs, jumps = self._to_parts(relaxed.evaluations, relaxed.kit, relaxed.assignment)
             failed = [d for d in designs if isinstance(d, SimulationFailure)]
@@ -246,14 +235,12 @@ class Stages:
             needed = failed or jumps and not settings.reassignments
             if not needed or attempt == attempts:
                 break
-            relaxed = self._rescued(relaxed, attempt, jumps, fixed_kit)
+            relaxed = self._rescued(relaxed, attempt, jumps)
         return relaxed, self.confirmed(
             self._result(designs, relaxed.kit, relaxed.assignment, jumps=jumps)
         )
 
-    def _rescued(
-        self, relaxed: StageResult, attempt: int, jumps: list[Jump], fixed_kit: bool
-    ) -> StageResult:
+    def _rescued(self, relaxed: StageResult, attempt: int, jumps: list[Jump]) -> StageResult:
         """The relaxed stage again from its end: with w_c raised, later with one more part of every
         kind."""
         settings, kit, q = (
@@ -276,9 +263,7 @@ class Stages:
                 restarts=settings.restarts,
                 seed=settings.seed,
             ).kit
-        result, _ = self._relax(
-            f"rescue-{attempt + 1}", weight, q, relaxed.evaluations, kit, fixed_kit
-        )
+        result, _ = self._relax(f"rescue-{attempt + 1}", weight, q, relaxed.evaluations, kit)
         data = result.point.data
         return StageResult(
             list(data.evaluations),
@@ -298,7 +283,6 @@ class Stages:
         q: np.ndarray,
         evaluations: Sequence[Evaluation],
         kit: Kit,
-        fixed_kit: bool,
     ) -> tuple[SQPResult, RelaxedProblem]:
         settings = self.settings
         problem = RelaxedProblem(
@@ -307,7 +291,7 @@ class Stages:
             kit,
             settings.bounds,
             settings.constraints,
-            fixed_kit,
+            self.rule,
         )
         options = SQPOptions(
             hessian=settings.hessian,

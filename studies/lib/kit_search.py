@@ -10,7 +10,7 @@ import numpy as np
 from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.kit.cluster import Clustering, cluster
 from kop_exudyn.kit.parts import Assignment, Kit
-from kop_exudyn.search.assigned import in_rounds
+from kop_exudyn.search.assigned import assigned_stage
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.objective import Weights
 from kop_exudyn.search.pool import DesignPool
@@ -53,7 +53,7 @@ def find_kit(
             if start is None
             else _from_neighbour(search, np.concatenate(list(start)))
         )
-        return _plain(dataset, in_rounds(search, at_parts))
+        return _plain(dataset, assigned_stage(search, at_parts))
 
 
 def pieces_by_design(
@@ -94,7 +94,7 @@ def _clustered(search: Stages, q: np.ndarray) -> Clustering:
     return cluster(
         search.dataset.groups,
         q,
-        search.parts,
+        search.rule.sizes,
         bounds=settings.bounds,
         restarts=settings.restarts,
         seed=settings.seed,

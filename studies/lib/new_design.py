@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kop_exudyn.kit.parts import Assignment, Kit
-from kop_exudyn.search.assigned import in_rounds
+from kop_exudyn.search.assigned import assigned_stage
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.objective import Evaluation, Weights
 from kop_exudyn.search.pool import DesignPool
@@ -40,15 +40,15 @@ def project_design(
         pool.prepare()
         dataset = Dataset.of_pool(pool, Weights.suiting([design]))
         search = Stages(
-            dataset, kit.sizes, replace(stages, schedule=(factor * design.fit_weight,), rescues=0)
+            dataset, kit, replace(stages, schedule=(factor * design.fit_weight,), rescues=0)
         )
-        direct = search.direct(kit)
-        relaxed, built = search.to_parts(search.relaxed(kit, fixed_kit=True), fixed_kit=True)
+        direct = search.direct()
+        relaxed, built = search.to_parts(search.relaxed(kit))
         states = {
             "direct": direct,
             "relaxed": search.confirmed(relaxed),
             "built": built,
-            "reassigned": in_rounds(search, built, fixed_kit=True),
+            "reassigned": assigned_stage(search, built),
         }
         found = {name: _plain(dataset, state, direct.assignment) for name, state in states.items()}
         found["relaxed"]["tightness"] = search.projection.tightness(

@@ -137,7 +137,7 @@ def test_fixed_kit_only_reassigns():
     kit = cluster(groups(), Q, {"linear": 3, "angular": 2}).kit
     projection = Projection.of_inputs(groups(), Q)
     moved = Q + 0.3 * np.sin(np.arange(len(Q)))
-    fixed, free = projection.minimise(moved, kit, fixed_kit=True), projection.minimise(moved, kit)
+    fixed, free = projection.assign(moved, kit), projection.minimise(moved, kit)
     np.testing.assert_array_equal(fixed.kit.vector, kit.vector)
     assert free.energy < fixed.energy
 

@@ -9,12 +9,12 @@ import pytest
 
 from kop_exudyn.kit.kinds import part_kind
 from kop_exudyn.search import assigned as rounds
-from kop_exudyn.search.assigned import in_rounds, that_open
+from kop_exudyn.search.assigned import assigned_stage, opened_stage
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.job import JobSettings, run_job
 from kop_exudyn.search.objective import Weights
 from kop_exudyn.search.pool import DesignPool
-from kop_exudyn.search.reassign import LocalModel, reassign
+from kop_exudyn.search.reassign import LocalModel, keep_parts, reassign
 from kop_exudyn.search.settings import StageSettings
 from kop_exudyn.search.stages import Stages
 from kop_exudyn.sqp.constraints import on_elements
@@ -126,15 +126,15 @@ def test_frozen_designs_and_fixed_kits_stay(stages, direct, derivatives):
     own = len(stages.dataset.designs[0].groups)
     for old, new in zip(direct.assignment.part[:own], found.assignment.part[:own]):
         np.testing.assert_array_equal(old, new)
-    fixed = reassign(problem, model, fixed_kit=True)
+    fixed = reassign(problem, model, move_parts=keep_parts)
     np.testing.assert_array_equal(fixed.kit.vector, direct.kit.vector)
     assert reassign(problem, model, frozen=[0, 1]) is None
 
 
 def test_rounds_only_improve(stages, direct):
     once = stages.assigned(direct)
-    assert in_rounds(stages, once).value <= once.value
-    found = in_rounds(stages, direct)
+    assert assigned_stage(stages, once).value <= once.value
+    found = assigned_stage(stages, direct)
     assert found.value < 0.1 * direct.value
     for evaluation in found.designs:
         assert evaluation.confirmations["deployed"].moved < 1e-8
@@ -143,28 +143,28 @@ def test_rounds_only_improve(stages, direct):
 
 def test_a_leap_is_kept_if_it_ends_lower_and_undone_otherwise(stages, direct, monkeypatch):
     low, high = sorted(
-        [in_rounds(leaping(stages, 0), direct), stages.assigned(direct)],
+        [assigned_stage(leaping(stages, 0), direct), stages.assigned(direct)],
         key=lambda result: result.value,
     )
     assert low.value < 0.9 * high.value
     # rounds stay where they are
-    monkeypatch.setattr(rounds, "_many_reassigned", lambda stages, best, fixed_kit: best)
+    monkeypatch.setattr(rounds, "_many_reassigned", lambda stages, best: best)
     monkeypatch.setattr(
         rounds,
         "_bold_trials",
-        lambda stages, best, fixed_kit: [low] if best.value > low.value else [],
+        lambda stages, best: [low] if best.value > low.value else [],
     )
-    kept = in_rounds(leaping(stages, 3), high)
+    kept = assigned_stage(leaping(stages, 3), high)
     assert kept.value <= low.value and kept.assignment.changes(low.assignment) == 0
-    monkeypatch.setattr(rounds, "_bold_trials", lambda stages, best, fixed_kit: [direct])
-    undone = in_rounds(leaping(stages, 1), low)
+    monkeypatch.setattr(rounds, "_bold_trials", lambda stages, best: [direct])
+    undone = assigned_stage(leaping(stages, 1), low)
     assert undone.value <= low.value and undone.assignment.changes(low.assignment) == 0
     # the steps of leaps that are undone count, too
-    assert undone.steps > in_rounds(leaping(stages, 0), low).steps
+    assert undone.steps > assigned_stage(leaping(stages, 0), low).steps
 
 
 def test_leaps_change_many_elements_at_once(stages, direct):
-    found = rounds._bold_trials(stages, direct, False)
+    found = rounds._bold_trials(stages, direct)
     values = [trial.value for trial in found]
     assert values and values == sorted(values)
     assert all(trial.assignment.changes(direct.assignment) >= 2 for trial in found)
@@ -175,23 +175,23 @@ def leaping(stages, leaps):
 
 
 def test_rounds_with_a_fixed_kit_change_the_assignment_only(stages, direct):
-    found = in_rounds(stages, direct, fixed_kit=True)
+    found = assigned_stage(Stages(stages.dataset, direct.kit, stages.settings), direct)
     np.testing.assert_array_equal(found.kit.vector, direct.kit.vector)
     assert found.value < direct.value and found.assignment.changes(direct.assignment) > 0
 
 
 def test_redeployment_improves_what_designs_open_into(stages, direct):
-    led = in_rounds(stages, direct)
+    led = assigned_stage(stages, direct)
     settings = replace(stages.settings, redeployments=2)
     willing = Stages(stages.dataset, PARTS, settings)
-    found = that_open(willing, led)
+    found = opened_stage(willing, led)
 
     def opened(result):
         return sum(outcome.value for outcome in stages.redeployed(result))
 
     assert opened(found) <= opened(led)
     assert found.assignment.changes(direct.assignment) > 0
-    assert that_open(stages, led).kit is led.kit  # not asked for: nothing happens
+    assert opened_stage(stages, led).kit is led.kit  # not asked for: nothing happens
 
 
 def test_constraints_on_elements_hold_in_both_stages(stages):
