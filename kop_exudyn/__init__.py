@@ -23,9 +23,12 @@ _PUBLIC = {
     "kit.parts": ("Assignment", "Kit"),
     "kit.cluster": ("cluster",),
     "search.input_fit": ("fit_input",),
-    "search.job": ("JobSettings", "run_job"),
+    "search.run": ("optimize_kit",),
     "search.objective": ("Weights",),
-    "search.settings": ("StageSettings",),
+    "search.settings": (
+        "JobSettings",
+        "StageSettings",
+    ),
     "equilibrium.sensitivities": ("Sensitivities",),
     "search.result": ("KitResult",),
     "analysis.simulation": ("SimulationResult", "simulate"),
@@ -37,7 +40,8 @@ _PUBLIC = {
     "io.results": ("load_result",),
     "io.saved_runs": ("load_run",),
     "fabrication.options": ("CutOptions",),
-    "report.kit_run": ("optimize_kit",),
+    "report.kit_report": ("write_kit_report",),
+    "report.kit_run": ("optimize_and_report",),
 }
 _MODULE_OF = {name: module for module, names in _PUBLIC.items() for name in names}
 

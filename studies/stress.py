@@ -31,8 +31,8 @@ from kop_exudyn.equilibrium.newton import Start
 from kop_exudyn.equilibrium.warm_up import warm_up
 from kop_exudyn.report.environment import peak_memory_mb
 from kop_exudyn.rods.rotations import exp_so3
-from kop_exudyn.search.job import JobSettings, run_job
-from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings, StageSettings
 from lib.stress import kills
 from lib.stress.arch import arches
 from lib.stress.fuzz import FuzzResult, fuzz
@@ -219,7 +219,12 @@ def interruptions(every: int) -> dict[str, int]:
     gone on with."""
     settings = JobSettings(jobs=1, stages=StageSettings(schedule=(1e3, 1e5)))
     store, events, found = MemoryStore(), [], Counter()
-    expected = fingerprint(run_job(arches(), {"linear": 2}, settings, store, events.append), events)
+    expected = fingerprint(
+        optimize_kit(
+            arches(), {"linear": 2}, settings=settings, store=store, observer=events.append
+        ),
+        events,
+    )
     for at in tqdm(range(1, store.saves + 1, every), "interruptions", disable=None):
         for after in (False, True):
             same = (

@@ -15,9 +15,8 @@ from kop_exudyn.drawing.style import with_palette
 from kop_exudyn.files.files import write_bytes
 from kop_exudyn.io.datasets import load_designs, select_files
 from kop_exudyn.report.environment import usable_cores
-from kop_exudyn.report.kit_run import optimize_kit
-from kop_exudyn.search.job import JobSettings
-from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.report.kit_run import optimize_and_report
+from kop_exudyn.search.settings import JobSettings, StageSettings
 
 ROOT = Path(__file__).resolve().parents[1]
 MODELS = ROOT / "models" / "conformals"
@@ -44,7 +43,7 @@ stages = (
 )
 
 # 3. All stages; results, figures and index.html go to the folder.
-result = optimize_kit(
+result = optimize_and_report(
     designs,
     parts,
     out=arguments.out,

@@ -19,9 +19,8 @@ from kop_exudyn.io.datasets import load_designs, select_files
 from kop_exudyn.report.designs import DrawnDesign, draw_designs
 from kop_exudyn.report.history import draw_history
 from kop_exudyn.report.kit_drawings import drawn_stages, histories
-from kop_exudyn.report.kit_run import optimize_kit
-from kop_exudyn.search.job import JobSettings
-from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.report.kit_run import optimize_and_report
+from kop_exudyn.search.settings import JobSettings, StageSettings
 from lib.stage_history import course, course_rows, draw_courses, input_states
 from lib.study import Study
 from lib.study_kits import QUICK_STAGES
@@ -43,7 +42,7 @@ def main() -> None:
         else replace(method, reassignments=0, relaxed_steps=60, assigned_steps=60)
     )
     results = {
-        name: optimize_kit(
+        name: optimize_and_report(
             designs,
             PARTS,
             out=study.out / "runs" / name.replace(" ", "_"),

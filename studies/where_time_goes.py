@@ -15,8 +15,8 @@ from pathlib import Path
 
 from kop_exudyn.equilibrium.warm_up import warm_up
 from kop_exudyn.io.datasets import load_designs
-from kop_exudyn.search.job import JobSettings, run_job
-from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings, StageSettings
 from lib.phases import PhaseClock, StepCosts, medians
 from lib.profile_drawing import draw_costs
 from lib.study import Study
@@ -47,8 +47,11 @@ def main() -> None:
     clock = PhaseClock()
     with clock.running():
         costs = StepCosts(clock)
-        outcome = run_job(
-            designs, PARTS, JobSettings(stages=stages, jobs=1, baselines=False), observer=costs
+        outcome = optimize_kit(
+            designs,
+            PARTS,
+            settings=JobSettings(stages=stages, jobs=1, baselines=False),
+            observer=costs,
         )
     steps = [step for step in costs.steps if step.stage in TITLES]
     whole = dict(clock.seconds)

@@ -275,7 +275,7 @@ class TestOptimize:
         """Replaces the optimisation; collects what it was asked for."""
         asked = {"failed": []}
 
-        def optimize_kit(designs, parts, **options):
+        def optimize_and_report(designs, parts, **options):
             asked.update(designs=[design.name for design in designs], parts=parts, **options)
 
             def summary(stage, n):
@@ -283,7 +283,7 @@ class TestOptimize:
 
             return SimpleNamespace(designs=designs, summary=summary)
 
-        monkeypatch.setattr(kit_run, "optimize_kit", optimize_kit)
+        monkeypatch.setattr(kit_run, "optimize_and_report", optimize_and_report)
         return asked
 
     def test_options_arrive(self, asked, design_file, tmp_path, capsys):

@@ -12,10 +12,9 @@ import pytest
 from kop_exudyn.cli import main
 from kop_exudyn.io.datasets import load_designs
 from kop_exudyn.io.saved_runs import load_run
-from kop_exudyn.report.kit_run import optimize_kit
+from kop_exudyn.report.kit_run import optimize_and_report
 from kop_exudyn.report.viewer_scenes import kit_scene
-from kop_exudyn.search.job import JobSettings
-from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.settings import JobSettings, StageSettings
 
 
 def shell(name: str, bow: float) -> dict:
@@ -47,7 +46,7 @@ def run(tmp_path_factory):
     stages = StageSettings(
         schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2
     )
-    optimize_kit(
+    optimize_and_report(
         load_designs(folder / "designs", ["flat", "bent"]),
         {"linear": 2, "angular": 2},
         out=folder / "run",

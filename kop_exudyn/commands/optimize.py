@@ -108,7 +108,7 @@ def run(args: argparse.Namespace) -> int:
     from ..io.kits import load_kit
     from ..io.studies import load_study
     from ..report.environment import usable_cores
-    from ..report.kit_run import optimize_kit
+    from ..report.kit_run import optimize_and_report
     from ..search.objective import Weights
 
     study = load_study(args.folder, args.designs)
@@ -119,12 +119,8 @@ def run(args: argparse.Namespace) -> int:
             value=args.parts,
         )
     kit = None if args.kit is None else load_kit(args.kit)
-    parts = (
-        kit.sizes
-        if kit is not None
-        else {_singular(k): count for k, count in (args.parts or study.parts).items()}
-    )
-    if not parts:
+    parts = {_singular(k): count for k, count in (args.parts or study.parts).items()}
+    if not parts and kit is None:
         raise InputError(
             "says nothing of the parts: --parts or --kit is required", source=args.folder
         )
@@ -135,9 +131,9 @@ def run(args: argparse.Namespace) -> int:
         weights={**study.weights, **(args.weights or {})},
     )
     designs = study.designs()
-    result = optimize_kit(
+    result = optimize_and_report(
         designs,
-        parts,
+        None if kit is not None else parts,
         out=args.out,
         inputs=study.files,
         resume=args.resume,

@@ -16,9 +16,8 @@ from ..errors import InputError
 from ..files.documents import check_envelope, check_range, check_schema
 from ..files.files import read_bytes
 from ..kit.kinds import Bounds
-from ..search.job import JobSettings
 from ..search.objective import Weights
-from ..search.settings import StageSettings
+from ..search.settings import JobSettings, StageSettings
 from ..structures.base import Design
 from .designs import design_files, load_all, select_among
 

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 
 from .assign import to_assignment
 from .cluster import lloyd
-from .elements import KindElements, Penalties, collect
+from .elements import KindElements, Labels, Penalties, collect
 from .groups import ElementGroup
 from .kinds import Bounds, part_kind
 from .parts import Assignment, Kit
@@ -110,7 +110,7 @@ class Projection:
         q: np.ndarray,
         kit: Kit,
         elements: dict[str, KindElements],
-        labels: dict[str, np.ndarray],
+        labels: dict[str, Labels],
     ) -> ProjectionMinimum:
         assignment = to_assignment(self.groups, len(q), elements, labels)
         return ProjectionMinimum(kit, assignment, self.energy(q, kit, assignment))

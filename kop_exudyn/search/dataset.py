@@ -3,9 +3,9 @@ side."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -15,8 +15,11 @@ from ..kit.groups import ElementGroup
 from ..kit.kinds import Bounds, part_kind
 from ..scene.state import State
 from ..structures.base import Design
-from .objective import DesignDerivatives, Evaluation, Reference, Weights
+from .objective import DesignDerivatives, DesignObjective, Evaluation, Reference, Weights
 from .pool import DesignPool
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 _EQUILIBRIUM_NUMBERS = ("torque", "elastic_energy", "potential", "residual")
 
@@ -161,18 +164,18 @@ class Dataset:
                 results[n] = previous[n]
             else:
                 calls[n] = (part, None if previous is None else previous[n])
-        for n, result in self._map("evaluate", calls).items():
+        for n, result in self._map(DesignObjective.evaluate, calls).items():
             results[n] = result
             if isinstance(result, Evaluation):
                 self.tally.add(result)
-        return _all_or_raise(results)
+        return all_or_raise(results)
 
     def derivatives(
         self, evaluations: Sequence[Evaluation], hessian: bool
     ) -> list[DesignDerivatives]:
         """Confirmed evaluations and their derivatives."""
         calls = {n: (evaluation, hessian) for n, evaluation in enumerate(evaluations)}
-        return _all_or_raise(list(self._map("derivatives", calls).values()))
+        return all_or_raise(list(self._map(DesignObjective.derivatives, calls).values()))
 
     def follow(
         self, q: np.ndarray, previous: Sequence[Evaluation], steps: int
@@ -180,7 +183,7 @@ class Dataset:
         """Straight paths of all designs to q; a design that fails on its way comes back as its
         failure."""
         calls = {n: (part, previous[n], steps) for n, part in enumerate(self.split(q))}
-        results = list(self._map("follow", calls).values())
+        results = list(self._map(DesignObjective.follow, calls).values())
         for path in results:
             for evaluation in path if isinstance(path, list) else ():
                 self.tally.add(evaluation)
@@ -190,24 +193,30 @@ class Dataset:
         self, evaluations: Mapping[int, Evaluation]
     ) -> dict[int, Evaluation | SimulationFailure]:
         """Exudyn's word on some designs."""
-        return self._map("confirm", {n: (e,) for n, e in evaluations.items()})
+        return self._map(DesignObjective.confirm, {n: (e,) for n, e in evaluations.items()})
 
     def redeploy(
         self, q: np.ndarray, members: Sequence[int]
     ) -> dict[int, Evaluation | SimulationFailure]:
         """Some designs deployed at q from their own starting geometry, without a warm start."""
         parts = self.split(q)
-        found = self._map("redeploy", {n: (parts[n],) for n in members})
+        found = self._map(DesignObjective.redeploy, {n: (parts[n],) for n in members})
         for evaluation in found.values():
             if isinstance(evaluation, Evaluation):
                 self.tally.add(evaluation)
         return found
 
-    def judge(self, calls: dict[int, tuple]) -> dict[int, Any]:
+    def judge(
+        self, calls: Mapping[int, tuple[np.ndarray, Mapping[str, Equilibrium]]]
+    ) -> dict[int, Evaluation | SimulationFailure]:
         """Evaluations of given parameters and equilibria, (q, {role: equilibrium}) a design."""
-        return self._map("judge", calls)
+        return self._map(DesignObjective.judge, calls)
 
-    def _map(self, method: str, calls: dict[int, tuple]) -> dict[int, Any]:
+    def _map(
+        self,
+        method: Callable[Concatenate[DesignObjective, P], T],
+        calls: Mapping[int, tuple[Any, ...]],
+    ) -> dict[int, T | SimulationFailure]:
         numbered = self.pool.map(
             method, self.weights, {self.numbers[n]: call for n, call in calls.items()}
         )
@@ -218,11 +227,14 @@ class Dataset:
         return float(sum(w * e.value for w, e in zip(self.design_weights, evaluations)))
 
 
-def _all_or_raise(results: list[Any]) -> list[Any]:
+def all_or_raise(results: Sequence[T | SimulationFailure]) -> list[T]:
+    """The results, where none is a failure. Raises the first SimulationFailure."""
+    found = []
     for result in results:
         if isinstance(result, SimulationFailure):
             raise result
-    return results
+        found.append(result)
+    return found
 
 
 def evaluations_to_arrays(evaluations: Sequence[Evaluation]) -> dict[str, np.ndarray]:
@@ -262,4 +274,4 @@ def evaluations_from_arrays(dataset: Dataset, arrays: Mapping[str, np.ndarray]) 
                 **dict(zip(_EQUILIBRIUM_NUMBERS, numbers)),
             )
         calls[n] = (np.array(arrays[f"{n}/q"]), equilibria)
-    return _all_or_raise(list(dataset.judge(calls).values()))
+    return all_or_raise(list(dataset.judge(calls).values()))

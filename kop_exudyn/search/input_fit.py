@@ -3,6 +3,7 @@ blame the kit."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,8 +20,7 @@ from .objective import DesignObjective, Evaluation, Weights
 class OwnProblem:
     """F(q) of one design over all its parameters, within its bounds and perhaps narrower ones.
 
-    A point's data is a list of the one evaluation there, which Exudyn's replaces once derivatives
-    are taken.
+    A point's data is the evaluation there; Exudyn's once derivatives were taken.
     """
 
     def __init__(self, objective: DesignObjective, lower: Any = -np.inf, upper: Any = np.inf):
@@ -36,17 +36,17 @@ class OwnProblem:
 
     def evaluate(self, x: np.ndarray, previous: Point | None) -> Point:
         return self.point(
-            self.objective.evaluate(x, previous.data[0] if previous is not None else None)
+            self.objective.evaluate(x, previous.data if previous is not None else None)
         )
 
     def point(self, evaluation: Evaluation) -> Point:
         """The point of a given evaluation."""
-        return Point(evaluation.q, evaluation.value, [evaluation])
+        return Point(evaluation.q, evaluation.value, evaluation)
 
     def derivatives(self, point: Point) -> Derivatives:
-        found = self.objective.derivatives(point.data[0])
-        point.data[0] = found.evaluation
-        return Derivatives(found.gradient, sp.csc_matrix(found.hessian))
+        found = self.objective.derivatives(point.data)
+        confirmed = replace(point, data=found.evaluation)
+        return Derivatives(found.gradient, sp.csc_matrix(found.hessian), point=confirmed)
 
 
 def fit_input(
@@ -71,4 +71,4 @@ def fit_input(
     problem = OwnProblem(objective, lower, upper)
     start = np.clip(design.parameters, problem.lower, problem.upper)
     result = minimise(problem, start, SQPOptions(max_steps=max_steps, decrease_tolerance=tolerance))
-    return objective.confirm(result.point.data[0])
+    return objective.confirm(result.point.data)

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
 
 from threadpoolctl import threadpool_limits
 
@@ -16,6 +17,9 @@ from .memory import peak_memory_mb
 from .objective import DesignObjective, Reference, Weights, reference_of
 
 log = logging.getLogger(__name__)
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 # Filled in every worker by its initializer: the designs, and the objectives made of them so far.
 _designs: list[Design] = []
@@ -44,18 +48,28 @@ def one_thread() -> threadpool_limits:
     return threadpool_limits(1, user_api="blas")
 
 
-def _call(
-    number: int, reference: Reference | None, weights: Weights, method: str, arguments: tuple
-) -> Any:
+@dataclass(frozen=True)
+class _Task(Generic[T]):
+    """A method of one design's objective with its arguments, or (without one) its reference."""
+
+    number: int
+    reference: Reference | None = None
+    weights: Weights = Weights()
+    method: Callable[..., T] | None = None
+    arguments: tuple[Any, ...] = ()
+
+
+def _run_task(task: _Task[T]) -> T | Reference | SimulationFailure:
     """Run in a worker; a failed simulation comes back as data, so that it doesn't end the whole
     batch."""
     try:
-        if reference is None:
-            return reference_of(_designs[number])
-        key = (number, weights)
+        if task.reference is None or task.method is None:
+            return reference_of(_designs[task.number])
+        key = (task.number, task.weights)
         if key not in _objectives:
-            _objectives[key] = DesignObjective(_designs[number], weights, reference)
-        return getattr(_objectives[key], method)(*arguments)
+            design = _designs[task.number]
+            _objectives[key] = DesignObjective(design, task.weights, task.reference)
+        return task.method(_objectives[key], *task.arguments)
     except SimulationFailure as failure:
         return failure
 
@@ -97,18 +111,28 @@ class DesignPool:
     def prepare(self) -> list[Reference]:
         """Simulate all input designs. Raises the first SimulationFailure: a kit needs all of
         them."""
-        results = self._run([(n, None, Weights(), "", ()) for n in range(len(self.designs))])
+        results = self._run([_Task(n) for n in range(len(self.designs))])
         for result in results:
             if isinstance(result, SimulationFailure):
                 raise result
         self.references = results
         return results
 
-    def map(self, method: str, weights: Weights, calls: dict[int, tuple]) -> dict[int, Any]:
-        """Call a method of the objectives of some designs: {number: arguments} -> {number: result
-        or failure}."""
+    def map(
+        self,
+        method: Callable[Concatenate[DesignObjective, P], T],
+        weights: Weights,
+        calls: Mapping[int, tuple[Any, ...]],
+    ) -> dict[int, T | SimulationFailure]:
+        """A method of the objectives of some designs, as `DesignObjective.evaluate`.
+
+        calls : {number: arguments}
+
+        Returns {number: result or failure}.
+        """
         tasks = [
-            (n, self.references[n], weights, method, arguments) for n, arguments in calls.items()
+            _Task(n, self.references[n], weights, method, arguments)
+            for n, arguments in calls.items()
         ]
         return dict(zip(calls, self._run(tasks)))
 
@@ -121,17 +145,17 @@ class DesignPool:
             found |= dict(self._parallel(delayed(_worker_memory)() for _ in range(4 * self.jobs)))
         return sum(found.values())
 
-    def _run(self, tasks: list[tuple]) -> list[Any]:
+    def _run(self, tasks: Sequence[_Task]) -> list[Any]:
         if self._parallel is None or len(tasks) < 2:
             if not _designs:
                 _initialise(self.designs)
-            return [_call(*task) for task in tasks]
+            return [_run_task(task) for task in tasks]
         from joblib import delayed
         from joblib.externals.loky.process_executor import TerminatedWorkerError
 
         for attempt in range(3):
             try:
-                return self._parallel(delayed(_call)(*task) for task in tasks)
+                return self._parallel(delayed(_run_task)(task) for task in tasks)
             except TerminatedWorkerError:
                 log.warning(
                     "a worker process ended unexpectedly; starting anew (attempt %d)", attempt + 1

@@ -3,7 +3,8 @@ alone (assigned)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,14 +16,14 @@ from ..sqp.constraints import LinearConstraints
 from ..sqp.problem import Derivatives, Point
 from .dataset import Dataset
 from .kit_rule import KitRule, SoughtKit
-from .objective import Evaluation
+from .objective import DesignDerivatives, Evaluation
 
 
-@dataclass
+@dataclass(frozen=True)
 class DatasetPoint:
     """What the problems keep with a point.
 
-    evaluations : of all designs; replaced by Exudyn's once derivatives are taken there
+    evaluations : of all designs; Exudyn's once derivatives were taken there
     solved : of all designs, as they were found first: a resumed run confirms and goes on from the
         same states
     kit, assignment : nearest to the point (relaxed), or that the point is made of (assigned)
@@ -33,10 +34,11 @@ class DatasetPoint:
     kit: Kit
     assignment: Assignment
     terms: dict[str, float]
-    solved: list[Evaluation] = field(init=False)
+    solved: list[Evaluation]
 
-    def __post_init__(self) -> None:
-        self.solved = self.evaluations
+    def confirmed(self, designs: Sequence[DesignDerivatives]) -> DatasetPoint:
+        """The same with the evaluations at which derivatives were taken."""
+        return replace(self, evaluations=[d.evaluation for d in designs])
 
 
 class RelaxedProblem:
@@ -75,12 +77,14 @@ class RelaxedProblem:
         nearest = self.rule.nearest(self.projection, x, kit)
         terms = _sum_terms(self.dataset, evaluations) | {"projection": nearest.energy}
         value = self.dataset.value(evaluations) + nearest.energy
-        return Point(x, value, DatasetPoint(evaluations, nearest.kit, nearest.assignment, terms))
+        return Point(
+            x, value, DatasetPoint(evaluations, nearest.kit, nearest.assignment, terms, evaluations)
+        )
 
     def derivatives(self, point: Point) -> Derivatives:
         data: DatasetPoint = point.data
         designs = self.dataset.derivatives(data.evaluations, hessian=True)
-        data.evaluations = [d.evaluation for d in designs]
+        confirmed = replace(point, data=data.confirmed(designs))
         weights = self.dataset.design_weights
         own = np.concatenate([w * d.gradient for w, d in zip(weights, designs)])
         gradient = own + self.projection.gradient(point.x, data.kit, data.assignment)
@@ -89,16 +93,17 @@ class RelaxedProblem:
         added, extra = self.rule.model(quadratic)
         if extra is None:
             whole = hessian if added is None else sp.csc_matrix(hessian + added)
-            return Derivatives(gradient, whole)
-        return Derivatives(gradient, hessian, extra, own)
+            return Derivatives(gradient, whole, point=confirmed)
+        return Derivatives(gradient, hessian, extra, own, confirmed)
 
     def first_derivatives(self, point: Point) -> Derivatives:
         """The gradient alone: one adjoint solve a state instead of all sensitivities."""
         data: DatasetPoint = point.data
         designs = self.dataset.derivatives(data.evaluations, hessian=False)
-        data.evaluations = [d.evaluation for d in designs]
+        confirmed = replace(point, data=data.confirmed(designs))
         own = np.concatenate([w * d.gradient for w, d in zip(self.dataset.design_weights, designs)])
-        return Derivatives(own + self.projection.gradient(point.x, data.kit, data.assignment))
+        gradient = own + self.projection.gradient(point.x, data.kit, data.assignment)
+        return Derivatives(gradient, point=confirmed)
 
 
 class AssignedProblem:
@@ -159,15 +164,14 @@ class AssignedProblem:
 
     def point(self, x: np.ndarray, evaluations: list[Evaluation]) -> Point:
         """The point of given evaluations."""
-        data = DatasetPoint(
-            evaluations, self.kit_of(x), self.assignment, _sum_terms(self.dataset, evaluations)
-        )
+        terms = _sum_terms(self.dataset, evaluations)
+        data = DatasetPoint(evaluations, self.kit_of(x), self.assignment, terms, evaluations)
         return Point(x, self.dataset.value(evaluations), data)
 
     def derivatives(self, point: Point) -> Derivatives:
         data: DatasetPoint = point.data
         designs = self.dataset.derivatives(data.evaluations, hessian=True)
-        data.evaluations = [d.evaluation for d in designs]
+        confirmed = replace(point, data=data.confirmed(designs))
         gradient, hessian = np.zeros(self.n), np.zeros((self.n, self.n))
         for weight, d, start, end in zip(
             self.dataset.design_weights, designs, self.dataset.offsets, self.dataset.offsets[1:]
@@ -178,17 +182,17 @@ class AssignedProblem:
         unused = np.flatnonzero(np.abs(hessian).sum(axis=1) == 0)
         # parts that nothing uses stay where they are
         hessian[unused, unused] = np.abs(hessian.diagonal()).mean()
-        return Derivatives(gradient, sp.csc_matrix(hessian))
+        return Derivatives(gradient, sp.csc_matrix(hessian), point=confirmed)
 
     def first_derivatives(self, point: Point) -> Derivatives:
         """The gradient alone, as in `RelaxedProblem`."""
         data: DatasetPoint = point.data
         designs = self.dataset.derivatives(data.evaluations, hessian=False)
-        data.evaluations = [d.evaluation for d in designs]
+        confirmed = replace(point, data=data.confirmed(designs))
         weighted = np.concatenate(
             [w * d.gradient for w, d in zip(self.dataset.design_weights, designs)]
         )
-        return Derivatives(self.matrix.T @ weighted)
+        return Derivatives(self.matrix.T @ weighted, point=confirmed)
 
     def _limit_by_designs(self) -> None:
         """An element's own bounds are its part's: entries of M are +-1, one a row."""

@@ -42,7 +42,7 @@ class KitResult:
 
     designs: list[Design]
     references: list[Reference]
-    stages: dict[str, StageResult]
+    stages: dict[str, StageResult] = field(default_factory=dict)
     events: list[StageEvent] = field(default_factory=list)
     equilibria: int = 0
     newton_iterations: int = 0
@@ -138,6 +138,7 @@ class KitResult:
                     "distance_percent": 100 * j.distance,
                 }
                 for name, stage in self.stages.items()
+                if name in STAGES
                 for j in stage.jumps
             ],
             "status": {

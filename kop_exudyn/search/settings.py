@@ -1,4 +1,4 @@
-"""What the stages of finding a kit are run with."""
+"""What a search is run with."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from ..kit.kinds import Bounds
 from ..sqp.constraints import LinearConstraints
+from .objective import Weights
 
 
 @dataclass(frozen=True)
@@ -61,3 +62,22 @@ class StageSettings:
     bounds: Bounds | None = None
     constraints: LinearConstraints | None = None
     hessian: str = "exact"
+
+
+@dataclass(frozen=True)
+class JobSettings:
+    """What a search is run with.
+
+    weights : of the objective's terms, default: the fit weight that suits the designs' class, see
+        `Design.fit_weight`
+    design_weights : how much each design counts (default: all the same)
+    stages : settings of the stages
+    jobs : processes
+    baselines : also compute the unrelaxed baseline
+    """
+
+    weights: Weights | None = None
+    design_weights: tuple[float, ...] | None = None
+    stages: StageSettings = StageSettings()
+    jobs: int = 2
+    baselines: bool = True

@@ -19,7 +19,7 @@ from ..sqp.constraints import check_feasible
 from ..sqp.history import SQPState
 from ..sqp.problem import Point
 from ..sqp.solver import SQPOptions, SQPResult, minimise
-from .dataset import Dataset, evaluations_from_arrays, evaluations_to_arrays
+from .dataset import Dataset, all_or_raise, evaluations_from_arrays, evaluations_to_arrays
 from .kit_rule import rule_of
 from .objective import Evaluation
 from .problems import AssignedProblem, RelaxedProblem
@@ -86,7 +86,7 @@ class Stages:
             n: (d.parameters, dict(r.equilibria))
             for n, (d, r) in enumerate(zip(self.dataset.designs, self.dataset.references))
         }
-        return list(self.dataset.judge(calls).values())
+        return all_or_raise(list(self.dataset.judge(calls).values()))
 
     def relaxed(
         self,
@@ -239,6 +239,21 @@ class Stages:
         return relaxed, self.confirmed(
             self._result(designs, relaxed.kit, relaxed.assignment, jumps=jumps)
         )
+
+    def from_neighbour(self, q: np.ndarray) -> StageResult:
+        """The designs led to the elements q (n_q,) of another kit, and from there to the parts that
+        suit these best; a design that fails on the first way starts from its input."""
+        inputs = self.inputs()
+        paths = self.dataset.follow(q, inputs, self.settings.path_steps)
+        start = [
+            first if isinstance(path, SimulationFailure) else path[-1]
+            for first, path in zip(inputs, paths)
+        ]
+        there = np.concatenate([evaluation.q for evaluation in start])
+        kit, assignment = self.rule.first(
+            self.dataset.groups, there, self.projection, self.settings
+        )
+        return self.confirmed(self.built_from(kit, assignment, start))
 
     def _rescued(self, relaxed: StageResult, attempt: int, jumps: list[Jump]) -> StageResult:
         """The relaxed stage again from its end: with w_c raised, later with one more part of every

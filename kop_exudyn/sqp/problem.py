@@ -47,12 +47,15 @@ class Derivatives:
     extra : see LiftedTerm; comes on top of ``hessian``
     own_gradient : (n,) gradient of the part that ``hessian`` belongs to, without the lifted term's
         (default: all)
+    point : the point that they were taken at, where the problem improved on the one it was given
+        (states confirmed or refined); it takes that one's place
     """
 
     gradient: np.ndarray
     hessian: sp.csc_matrix | None = None
     extra: LiftedTerm | None = None
     own_gradient: np.ndarray | None = None
+    point: Point | None = None
 
 
 class Problem(Protocol):

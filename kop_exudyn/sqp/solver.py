@@ -163,6 +163,7 @@ class _Run:
     def solve(self, x0: np.ndarray, state: SQPState | None, start: Point | None) -> SQPResult:
         state, point = self._begin(x0, state, start)
         derivatives = self._timed("derivatives", self._derivatives, point)
+        point = derivatives.point or point
         while True:
             norm, state = self._stationarity(point, derivatives, state)
             if norm <= self.options.gradient_tolerance * max(
@@ -290,6 +291,8 @@ class _Run:
                 derivatives = (
                     self._timed("derivatives", self._derivatives, trial) if accepted else None
                 )
+                if derivatives is not None and derivatives.point is not None:
+                    trial = derivatives.point
             except SimulationFailure as failure:
                 failures, last = failures + 1, str(failure)
                 radius = 0.25 * min(step.length, radius)

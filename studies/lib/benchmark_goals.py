@@ -17,7 +17,8 @@ import numpy as np
 from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.equilibrium.sensitivities import Sensitivities
 from kop_exudyn.equilibrium.system import System
-from kop_exudyn.search.job import JobSettings, run_job
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings
 from kop_exudyn.structures.base import Design, design_from_dict
 from kop_exudyn.structures.umbrella.design import Umbrella
 
@@ -209,10 +210,10 @@ def kit_problem(
     """Wall time of both stages for some designs, from their input states on, in `jobs`
     processes."""
     phases: list[tuple[str, float]] = []
-    outcome = run_job(
+    outcome = optimize_kit(
         designs,
         parts,
-        JobSettings(jobs=jobs, baselines=False),
+        settings=JobSettings(jobs=jobs, baselines=False),
         announce=lambda phase: phases.append((phase, perf_counter())),
     )
     ends = [begin for _, begin in phases[1:]] + [perf_counter()]

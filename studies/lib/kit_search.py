@@ -7,17 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from kop_exudyn.errors import SimulationFailure
-from kop_exudyn.kit.cluster import Clustering, cluster
 from kop_exudyn.kit.parts import Assignment, Kit
-from kop_exudyn.search.assigned import assigned_stage
-from kop_exudyn.search.dataset import Dataset
-from kop_exudyn.search.objective import Weights
-from kop_exudyn.search.pool import DesignPool
-from kop_exudyn.search.result import summary_of
-from kop_exudyn.search.settings import StageSettings
-from kop_exudyn.search.stage_results import StageResult
-from kop_exudyn.search.stages import Stages
+from kop_exudyn.search.result import KitResult
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.structures.base import Design
 
 
@@ -44,16 +37,8 @@ def find_kit(
     Raises InputError for impossible requests, SimulationFailure when a design can't be simulated at
     the start.
     """
-    with DesignPool(designs, jobs) as pool:
-        pool.prepare()
-        dataset = Dataset.of_pool(pool, Weights.suiting(designs))
-        search = Stages(dataset, parts, stages)
-        at_parts = (
-            _from_inputs(search)
-            if start is None
-            else _from_neighbour(search, np.concatenate(list(start)))
-        )
-        return _plain(dataset, assigned_stage(search, at_parts))
+    settings = JobSettings(stages=stages, jobs=jobs, baselines=False)
+    return _plain(optimize_kit(designs, parts, start=start, settings=settings))
 
 
 def pieces_by_design(
@@ -71,52 +56,18 @@ def pieces_by_design(
     return found
 
 
-def _from_inputs(search: Stages) -> StageResult:
-    """The state at the parts after the relaxed stage."""
-    return search.to_parts(search.relaxed(_clustered(search, search.q0).kit))[1]
-
-
-def _from_neighbour(search: Stages, q: np.ndarray) -> StageResult:
-    """The designs led to the elements of another kit, and from there to the parts that suit these
-    best."""
-    inputs = search.inputs()
-    paths = search.dataset.follow(q, inputs, search.settings.path_steps)
-    start = [
-        first if isinstance(path, SimulationFailure) else path[-1]
-        for first, path in zip(inputs, paths)
-    ]
-    found = _clustered(search, np.concatenate([evaluation.q for evaluation in start]))
-    return search.confirmed(search.built_from(found.kit, found.assignment, start))
-
-
-def _clustered(search: Stages, q: np.ndarray) -> Clustering:
-    settings = search.settings
-    return cluster(
-        search.dataset.groups,
-        q,
-        search.rule.sizes,
-        bounds=settings.bounds,
-        restarts=settings.restarts,
-        seed=settings.seed,
-    )
-
-
-def _plain(dataset: Dataset, assigned: StageResult) -> dict[str, Any]:
-    realised = dataset.split(assigned.assignment.matrix(assigned.kit) @ assigned.kit.vector)
-    designs = [
-        {
-            "name": design.name,
-            "elements": design.n_elements,
-            **summary_of(outcome, design, reference),
-        }
-        for design, outcome, reference in zip(dataset.designs, assigned.designs, dataset.references)
-    ]
+def _plain(result: KitResult) -> dict[str, Any]:
+    offsets = np.cumsum([len(design.parameters) for design in result.designs])[:-1]
+    realised = np.split(result.assignment.matrix(result.kit) @ result.kit.vector, offsets)
     return {
-        "kit": assigned.kit.to_dict(),
-        "assignment": assigned.assignment.to_dict(),
-        "pieces": pieces_by_design(dataset.designs, assigned.kit, assigned.assignment),
+        "kit": result.kit.to_dict(),
+        "assignment": result.assignment.to_dict(),
+        "pieces": pieces_by_design(result.designs, result.kit, result.assignment),
         "realised": realised,
-        "designs": designs,
-        "objective": assigned.value,
-        "equilibria": dataset.tally.equilibria,
+        "designs": [
+            {"name": design.name, "elements": design.n_elements, **result.summary("assigned", n)}
+            for n, design in enumerate(result.designs)
+        ],
+        "objective": result.stages["assigned"].value,
+        "equilibria": result.equilibria,
     }

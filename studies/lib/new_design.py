@@ -9,14 +9,11 @@ from typing import Any
 import numpy as np
 
 from kop_exudyn.kit.parts import Assignment, Kit
-from kop_exudyn.search.assigned import assigned_stage
-from kop_exudyn.search.dataset import Dataset
-from kop_exudyn.search.objective import Evaluation, Weights
-from kop_exudyn.search.pool import DesignPool
-from kop_exudyn.search.result import summary_of
-from kop_exudyn.search.settings import StageSettings
-from kop_exudyn.search.stage_results import StageResult
-from kop_exudyn.search.stages import Stages
+from kop_exudyn.kit.projection import Projection
+from kop_exudyn.search.objective import Evaluation
+from kop_exudyn.search.result import KitResult
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.structures.base import Design
 
 
@@ -36,25 +33,21 @@ def project_design(
 
     Raises SimulationFailure when the input design can't be simulated.
     """
-    with DesignPool([design]) as pool:
-        pool.prepare()
-        dataset = Dataset.of_pool(pool, Weights.suiting([design]))
-        search = Stages(
-            dataset, kit, replace(stages, schedule=(factor * design.fit_weight,), rescues=0)
-        )
-        direct = search.direct()
-        relaxed, built = search.to_parts(search.relaxed(kit))
-        states = {
-            "direct": direct,
-            "relaxed": search.confirmed(relaxed),
-            "built": built,
-            "reassigned": assigned_stage(search, built),
-        }
-        found = {name: _plain(dataset, state, direct.assignment) for name, state in states.items()}
-        found["relaxed"]["tightness"] = search.projection.tightness(
-            relaxed.evaluations[0].q, kit, relaxed.assignment
-        )
-        return {"weight": factor * design.fit_weight, "elements": design.n_elements, **found}
+    settings = JobSettings(
+        stages=replace(stages, schedule=(factor * design.fit_weight,), rescues=0), jobs=1
+    )
+    result = optimize_kit([design], kit=kit, settings=settings)
+    names = {"direct": "direct", "relaxed": "relaxed", "built": "built", "assigned": "reassigned"}
+    direct = result.stages["direct"].assignment
+    found = {name: _plain(result, stage, direct) for stage, name in names.items()}
+    relaxed, projection = (
+        result.stages["relaxed"],
+        Projection.of_inputs(design.groups, design.parameters),
+    )
+    found["relaxed"]["tightness"] = projection.tightness(
+        relaxed.evaluations[0].q, kit, relaxed.assignment
+    )
+    return {"weight": factor * design.fit_weight, "elements": design.n_elements, **found}
 
 
 def changed_parameters(before: Assignment, after: Assignment) -> np.ndarray:
@@ -68,9 +61,10 @@ def changed_parameters(before: Assignment, after: Assignment) -> np.ndarray:
     return np.sort(np.concatenate(rows)) if rows else np.empty(0, dtype=int)
 
 
-def _plain(dataset: Dataset, state: StageResult, direct: Assignment) -> dict[str, Any]:
-    design, outcome = dataset.designs[0], state.designs[0]
-    found = summary_of(outcome, design, dataset.references[0]) | {
+def _plain(result: KitResult, stage: str, direct: Assignment) -> dict[str, Any]:
+    state, design = result.stages[stage], result.designs[0]
+    outcome = state.designs[0]
+    found = result.summary(stage, 0) | {
         "objective": state.value,
         "changes": direct.changes(state.assignment),
         "changed": changed_parameters(direct, state.assignment),

@@ -11,10 +11,10 @@ from kop_exudyn.errors import InputError
 from kop_exudyn.io.checkpoint import Job
 from kop_exudyn.io.datasets import load_designs, select_files
 from kop_exudyn.io.saved_runs import load_run
-from kop_exudyn.report.kit_run import described_job, optimize_kit
-from kop_exudyn.search.job import JobSettings
+from kop_exudyn.report.kit_run import optimize_and_report
 from kop_exudyn.search.result import KitResult
-from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.run import described_job
+from kop_exudyn.search.settings import JobSettings, StageSettings
 
 from .study import Study
 
@@ -80,12 +80,12 @@ def kit_of(case: KitCase, folder: Path, jobs: int) -> KitResult:
     """The kit of a case: a finished run of the same job in its folder, or a new run, which goes on
     from checkpoints.
 
-    Raises InputError and SimulationFailure as `optimize_kit` does.
+    Raises InputError and SimulationFailure as `optimize_and_report` does.
     """
     designs, files = load_designs(case.folder, case.number), case.files
     settings = JobSettings(stages=case.stages, jobs=jobs)
     record = folder / "checkpoints" / "job.json"
-    job = Job.of(described_job(designs, case.parts, settings), files)
+    job = Job.of(described_job(designs, case.parts, None, settings), files)
     same = record.exists() and Job.load(record).difference(job) is None
     if same and (folder / "result.json").exists():
         try:
@@ -93,7 +93,7 @@ def kit_of(case: KitCase, folder: Path, jobs: int) -> KitResult:
         except InputError:  # a result of an earlier version: computed anew
             same = False
     (folder / "result.json").unlink(missing_ok=True)
-    return optimize_kit(
+    return optimize_and_report(
         designs,
         case.parts,
         out=folder,

@@ -12,9 +12,9 @@ from kop_exudyn.exchange.export import export_desk, export_workshop
 from kop_exudyn.exchange.result_tables import result_tables
 from kop_exudyn.files.files import file_stem
 from kop_exudyn.files.tables import csv_text
-from kop_exudyn.search.job import JobSettings, run_job
 from kop_exudyn.search.result import KitResult
-from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings, StageSettings
 
 
 @pytest.fixture(scope="module")
@@ -28,9 +28,8 @@ def result(shells):
         ),
     )
     events = []
-    outcome = run_job(shells, {"linear": 3, "angular": 2}, settings, observer=events.append)
-    return KitResult(
-        shells, outcome.references, outcome.stages, events, redeployed=outcome.redeployed
+    return optimize_kit(
+        shells, {"linear": 3, "angular": 2}, settings=settings, observer=events.append
     )
 
 

@@ -10,9 +10,9 @@ from kop_exudyn.files.arrays import load_arrays, save_arrays
 from kop_exudyn.io.results import load_result, save_result, save_states
 from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.report.kit_drawings import final_states, histories, summary_rows
-from kop_exudyn.search.job import JobSettings, run_job
-from kop_exudyn.search.result import STAGES, KitResult
-from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.result import STAGES
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.search.stage_results import Jump
 from kop_exudyn.structures.fitting import TargetFitting
 
@@ -24,14 +24,11 @@ def finished(shells, tmp_path_factory):
         schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2
     )
     events = []
-    outcome = run_job(
+    result = optimize_kit(
         shells,
         {"linear": 3, "angular": 2},
-        JobSettings(jobs=1, baselines=False, stages=stages),
+        settings=JobSettings(jobs=1, baselines=False, stages=stages),
         observer=events.append,
-    )
-    result = KitResult(
-        shells, outcome.references, outcome.stages, events, redeployed=outcome.redeployed
     )
     result.stages["direct"].jumps.append(Jump(shells[0].name, 0.5, 0.07))
     save_result(folder / "result.json", result.to_dict())

@@ -16,11 +16,10 @@ from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.kit.groups import ElementGroup
 from kop_exudyn.kit.parts import Kit
 from kop_exudyn.report.kit_drawings import drawn_designs, histories, part_spaces
-from kop_exudyn.report.kit_run import optimize_kit
+from kop_exudyn.report.kit_run import optimize_and_report
 from kop_exudyn.rods.rotations import rotation_z
 from kop_exudyn.scene.builder import SceneBuilder
-from kop_exudyn.search.job import JobSettings
-from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.structures.base import Design, Role, Target
 
 STIFFNESS = np.array([1e4, 4e3, 4e3, 0.8, 1.0, 1.0])
@@ -101,7 +100,9 @@ def zigzags() -> list[Zigzag]:
 def finished(tmp_path_factory):
     """A finished run, and its folder."""
     out = tmp_path_factory.mktemp("run") / "out"
-    return optimize_kit(zigzags(), {"linear": 3, "angular": 2}, out=out, settings=SETTINGS), out
+    return optimize_and_report(
+        zigzags(), {"linear": 3, "angular": 2}, out=out, settings=SETTINGS
+    ), out
 
 
 def test_the_folder_holds_all_that_is_promised(finished):
@@ -192,9 +193,9 @@ def test_killed_and_resumed_gives_the_same(finished, tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(CheckpointStore, "save", dies_at_the_third)
         with pytest.raises(KeyboardInterrupt):
-            optimize_kit(zigzags(), {"linear": 3, "angular": 2}, **arguments)
+            optimize_and_report(zigzags(), {"linear": 3, "angular": 2}, **arguments)
     assert not (tmp_path / "out" / "result.json").exists()
-    resumed = optimize_kit(zigzags(), {"linear": 3, "angular": 2}, resume=True, **arguments)
+    resumed = optimize_and_report(zigzags(), {"linear": 3, "angular": 2}, resume=True, **arguments)
     np.testing.assert_array_equal(resumed.kit.vector, result.kit.vector)
     volatile = {"wall_s", "peak_memory_mb", "exudyn", "seconds"}
     first, second = (
@@ -212,9 +213,7 @@ def test_killed_and_resumed_gives_the_same(finished, tmp_path, monkeypatch):
 def test_designs_from_a_kit_that_exists(finished, tmp_path):
     """The parts stay as they are; the page and the saved run know of it."""
     kit = load_kit(finished[1] / "kit.json")
-    result = optimize_kit(
-        zigzags()[:1], kit.sizes, out=tmp_path / "out", settings=SETTINGS, kit=kit
-    )
+    result = optimize_and_report(zigzags()[:1], out=tmp_path / "out", settings=SETTINGS, kit=kit)
     np.testing.assert_array_equal(result.kit.vector, kit.vector)
     evaluation = result.stages["assigned"].designs[0]
     assert "unrelaxed" not in result.stages and evaluation.confirmations
@@ -230,15 +229,13 @@ def test_designs_from_a_kit_that_exists(finished, tmp_path):
     with pytest.raises(
         InputError, match="kit = 'linear': the kit has no angular parts, which zigzag 0 is made of"
     ):
-        optimize_kit(
-            zigzags()[:1], {"linear": 3}, out=tmp_path / "no", kit=Kit({"linear": kit["linear"]})
-        )
+        optimize_and_report(zigzags()[:1], out=tmp_path / "no", kit=Kit({"linear": kit["linear"]}))
     assert not (tmp_path / "no").exists()
 
 
 def test_another_job_is_not_resumed(finished):
     with pytest.raises(InputError, match="different job: parts.linear was 3 and is now 4"):
-        optimize_kit(
+        optimize_and_report(
             zigzags(), {"linear": 4, "angular": 2}, out=finished[1], settings=SETTINGS, resume=True
         )
 
@@ -256,7 +253,7 @@ def test_another_job_is_not_resumed(finished):
 )
 def test_impossible_requests_fail_before_anything_is_written(tmp_path, parts, message):
     with pytest.raises(InputError, match=message):
-        optimize_kit(zigzags(), parts, out=tmp_path / "out", settings=SETTINGS)
+        optimize_and_report(zigzags(), parts, out=tmp_path / "out", settings=SETTINGS)
     assert not (tmp_path / "out").exists()
 
 

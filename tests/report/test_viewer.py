@@ -24,9 +24,8 @@ from kop_exudyn.report.viewer import (
     viewer_page,
 )
 from kop_exudyn.report.viewer_scenes import design_scene, kit_scene, opening_path
-from kop_exudyn.search.job import JobSettings, run_job
-from kop_exudyn.search.result import KitResult
-from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.structures.base import design_from_dict
 
 SECTION = np.array([[0.1, 0.1], [-0.1, 0.1], [-0.1, -0.1], [0.1, -0.1]])
@@ -96,10 +95,11 @@ def result():
     stages = StageSettings(
         schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2
     )
-    outcome = run_job(
-        designs, {"linear": 2, "angular": 2}, JobSettings(jobs=1, baselines=False, stages=stages)
+    return optimize_kit(
+        designs,
+        {"linear": 2, "angular": 2},
+        settings=JobSettings(jobs=1, baselines=False, stages=stages),
     )
-    return KitResult(designs, outcome.references, outcome.stages)
 
 
 @pytest.fixture(scope="module")

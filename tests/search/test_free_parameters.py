@@ -10,11 +10,11 @@ import pytest
 
 from kop_exudyn.kit.cluster import cluster
 from kop_exudyn.search.dataset import Dataset
-from kop_exudyn.search.job import JobSettings, run_job
 from kop_exudyn.search.objective import Weights
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.problems import AssignedProblem
-from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.sqp.problem import Point
 from kop_exudyn.structures.base import Design, design_from_dict
 from kop_exudyn.structures.umbrella.generator import design_on_surface, height_field, hexagon_patch
@@ -44,7 +44,9 @@ def outcome(designs):
         reassignments=1,
         path_steps=2,
     )
-    return run_job(designs, {"cell": 3}, JobSettings(jobs=1, baselines=False, stages=stages))
+    return optimize_kit(
+        designs, {"cell": 3}, settings=JobSettings(jobs=1, baselines=False, stages=stages)
+    )
 
 
 def test_the_problem_over_parts_has_them_as_variables(designs):

@@ -11,11 +11,11 @@ from kop_exudyn.kit.kinds import part_kind
 from kop_exudyn.search import assigned as rounds
 from kop_exudyn.search.assigned import assigned_stage, opened_stage
 from kop_exudyn.search.dataset import Dataset
-from kop_exudyn.search.job import JobSettings, run_job
 from kop_exudyn.search.objective import Weights
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.reassign import LocalModel, keep_parts, reassign
-from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.search.stages import Stages
 from kop_exudyn.sqp.constraints import on_elements
 from kop_exudyn.structures.base import design_from_dict
@@ -209,15 +209,17 @@ def test_constraints_on_elements_hold_in_both_stages(stages):
     constraints = on_elements(designs, statement)
     assert constraints.rows == 2
     settings = StageSettings(schedule=(1e3, 1e5), constraints=constraints)
-    outcome = run_job(designs, PARTS, JobSettings(jobs=1, baselines=False, stages=settings))
+    outcome = optimize_kit(
+        designs, PARTS, settings=JobSettings(jobs=1, baselines=False, stages=settings)
+    )
     scale = float(np.abs(constraints.upper).max())
     for stage in ("relaxed", "assigned"):
         q = np.concatenate([e.q for e in outcome.stages[stage].designs])
         assert constraints.violation(q) < 1e-7 * scale, stage
-    free = run_job(
+    free = optimize_kit(
         designs,
         PARTS,
-        JobSettings(jobs=1, baselines=False, stages=StageSettings(schedule=(1e3, 1e5))),
+        settings=JobSettings(jobs=1, baselines=False, stages=StageSettings(schedule=(1e3, 1e5))),
     )
     q = np.concatenate([e.q for e in free.stages["assigned"].designs])
     assert constraints.violation(q) > 1e-3 * scale

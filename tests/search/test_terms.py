@@ -8,9 +8,9 @@ import pytest
 from kop_exudyn.equilibrium.newton import NewtonOptions
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.designs import load_design
-from kop_exudyn.search.job import JobSettings, run_job
 from kop_exudyn.search.objective import DesignObjective, Weights
-from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.search.terms import base
 from kop_exudyn.structures.base import design_from_dict
 
@@ -88,7 +88,7 @@ def test_more_weight_on_stress_lowers_it(repository):
                 schedule=(1e4,), reassignments=0, relaxed_steps=6, assigned_steps=10
             ),
         )
-        outcome = run_job(designs, {"linear": 4, "angular": 3}, settings)
+        outcome = optimize_kit(designs, {"linear": 4, "angular": 3}, settings=settings)
         judge = [
             DesignObjective(d, Weights(others=(("stress", 1.0),)), r)
             for d, r in zip(designs, outcome.references)
@@ -149,7 +149,7 @@ def test_a_term_is_one_class(repository, monkeypatch):
         baselines=False,
         stages=StageSettings(schedule=(1e3,), reassignments=0, relaxed_steps=4, assigned_steps=4),
     )
-    outcome = run_job([design], {"linear": 2, "angular": 2}, settings)
+    outcome = optimize_kit([design], {"linear": 2, "angular": 2}, settings=settings)
     evaluation = outcome.stages["assigned"].designs[0]
     assert 0 < evaluation.terms["material deployed"] < 20.0  # what gives, shrinks
     assert evaluation.confirmations

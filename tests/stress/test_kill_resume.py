@@ -12,10 +12,10 @@ import pytest
 from kop_exudyn.errors import InputError
 from kop_exudyn.files import files
 from kop_exudyn.files.arrays import load_arrays
-from kop_exudyn.report.kit_run import optimize_kit
+from kop_exudyn.report.kit_run import optimize_and_report
 from kop_exudyn.search import pool
-from kop_exudyn.search.job import JobSettings, run_job
-from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings, StageSettings
 from lib.stress import kills
 from lib.stress.arch import arches
 from lib.stress.interruption import FailingStore, MemoryStore, fingerprint, resumed_at
@@ -28,7 +28,7 @@ SETTINGS = JobSettings(jobs=1, stages=StageSettings(schedule=(1e3, 1e5)))
 def undisturbed():
     """The outcome, the events and the number of checkpoints of a job that nobody disturbs."""
     store, events = MemoryStore(), []
-    outcome = run_job(arches(), PARTS, SETTINGS, store, events.append)
+    outcome = optimize_kit(arches(), PARTS, settings=SETTINGS, store=store, observer=events.append)
     assert store.saves >= 8
     return (
         fingerprint(outcome, events),
@@ -63,8 +63,8 @@ def test_interrupted_between_checkpoints(undisturbed, monkeypatch, batch):
 
     monkeypatch.setattr(pool.DesignPool, "_run", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        run_job(arches(), PARTS, SETTINGS, store)
-    outcome = run_job(arches(), PARTS, SETTINGS, store, events.append)
+        optimize_kit(arches(), PARTS, settings=SETTINGS, store=store)
+    outcome = optimize_kit(arches(), PARTS, settings=SETTINGS, store=store, observer=events.append)
     assert fingerprint(outcome, events) == undisturbed[0]
 
 
@@ -75,7 +75,9 @@ def test_interrupted_again_and_again(undisturbed):
         failing = FailingStore(1, KeyboardInterrupt(), after=True)
         failing.kept, events, runs = store.kept, [], runs + 1
         try:
-            outcome = run_job(arches(), PARTS, SETTINGS, failing, events.append)
+            outcome = optimize_kit(
+                arches(), PARTS, settings=SETTINGS, store=failing, observer=events.append
+            )
             break
         except KeyboardInterrupt:
             continue
@@ -96,14 +98,14 @@ def test_interrupted_again_and_again(undisturbed):
 )
 def test_a_checkpoint_of_something_else(damage):
     store = MemoryStore()
-    run_job(arches(), PARTS, SETTINGS, store)
+    optimize_kit(arches(), PARTS, settings=SETTINGS, store=store)
     before = {name: dict(arrays) for name, arrays in store.kept.items()}
     damage(store.kept["relaxed-1000"])
     if "0/deployed/numbers" in store.kept["relaxed-1000"]:  # an array too many harms nobody
-        run_job(arches(), PARTS, SETTINGS, store)
+        optimize_kit(arches(), PARTS, settings=SETTINGS, store=store)
         return
     with pytest.raises(InputError, match="checkpoint 'relaxed-1000' is damaged: start anew"):
-        run_job(arches(), PARTS, SETTINGS, store)
+        optimize_kit(arches(), PARTS, settings=SETTINGS, store=store)
     assert store.kept.keys() == before.keys()
 
 
@@ -111,7 +113,7 @@ def test_a_checkpoint_of_something_else(damage):
 def good(tmp_path_factory):
     """What an undisturbed run leaves."""
     out = tmp_path_factory.mktemp("good") / "out"
-    optimize_kit(arches(), PARTS, out=out, settings=SETTINGS)
+    optimize_and_report(arches(), PARTS, out=out, settings=SETTINGS)
     return kills.outcome(out)
 
 
@@ -130,20 +132,20 @@ class TestFullDisk:
 
         monkeypatch.setattr(files.os, "fsync", fsync)
         with pytest.raises(InputError, match="can't be written: no space left on device"):
-            optimize_kit(arches(), PARTS, out=tmp_path / "full", settings=SETTINGS)
+            optimize_and_report(arches(), PARTS, out=tmp_path / "full", settings=SETTINGS)
         left = [path for path in (tmp_path / "full").rglob("*") if path.is_file()]
         assert not [path for path in left if path.name.startswith(".")]
         for path in left:
             if path.suffix == ".npz":
                 load_arrays(path)
         monkeypatch.setattr(files.os, "fsync", original)
-        optimize_kit(arches(), PARTS, out=tmp_path / "full", settings=SETTINGS, resume=True)
+        optimize_and_report(arches(), PARTS, out=tmp_path / "full", settings=SETTINGS, resume=True)
         assert kills.outcome(tmp_path / "full") == good
 
     def test_a_store_that_raises_leaves_what_it_kept(self):
         store = FailingStore(4, OSError(errno.ENOSPC, "No space left on device"))
         with pytest.raises(OSError, match="No space left"):
-            run_job(arches(), PARTS, SETTINGS, store)
+            optimize_kit(arches(), PARTS, settings=SETTINGS, store=store)
         assert store.saves == 3 and store.kept
 
 
@@ -153,7 +155,7 @@ def test_what_a_kill_while_writing_leaves_is_cleaned_up(tmp_path, good):
     checkpoints.mkdir(parents=True)
     piece = checkpoints / ".job.json.x3f.part"
     piece.write_bytes(b"{")
-    optimize_kit(arches(), PARTS, out=tmp_path / "out", settings=SETTINGS, resume=True)
+    optimize_and_report(arches(), PARTS, out=tmp_path / "out", settings=SETTINGS, resume=True)
     assert not piece.exists()
     assert kills.outcome(tmp_path / "out") == good
 

@@ -14,8 +14,8 @@ import pytest
 from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.kit.parts import Kit
 from kop_exudyn.search import pool
-from kop_exudyn.search.job import JobSettings, run_job
-from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings, StageSettings
 from lib.stress.arch import Arch, arches
 from lib.stress.interruption import MemoryStore, fingerprint
 
@@ -24,7 +24,13 @@ SCHEDULE = (1e3, 1e5)
 
 def run(designs, parts, kit=None, **stages):
     settings = JobSettings(jobs=1, stages=StageSettings(**({"schedule": SCHEDULE} | stages)))
-    return run_job(designs, {"linear": parts}, settings, MemoryStore(), kit=kit)
+    return optimize_kit(
+        designs,
+        {"linear": parts} if kit is None else None,
+        kit=kit,
+        settings=settings,
+        store=MemoryStore(),
+    )
 
 
 def check(outcome, designs, given=False):
@@ -164,8 +170,8 @@ class TestWorkers:
             jobs=2,
             stages=StageSettings(schedule=(1e3,), relaxed_steps=2, assigned_steps=2, path_steps=3),
         )
-        undisturbed = fingerprint(run_job(designs, {"linear": 2}, settings))
-        monkeypatch.setattr(pool, "_call", _slow_call)
+        undisturbed = fingerprint(optimize_kit(designs, {"linear": 2}, settings=settings))
+        monkeypatch.setattr(pool, "_run_task", _slow_task)
         batches, kills = [], []
         original = pool.DesignPool._run
 
@@ -181,25 +187,25 @@ class TestWorkers:
             return original(self, tasks)
 
         monkeypatch.setattr(pool.DesignPool, "_run", run_and_kill)
-        assert fingerprint(run_job(designs, {"linear": 2}, settings)) == undisturbed
+        assert fingerprint(optimize_kit(designs, {"linear": 2}, settings=settings)) == undisturbed
         assert len(kills) == 2
         assert caplog.text.count("a worker process ended unexpectedly") == 2
 
     def test_workers_that_always_die_end_the_job(self, monkeypatch, caplog):
-        monkeypatch.setattr(pool, "_call", _die)
+        monkeypatch.setattr(pool, "_run_task", _die)
         with pytest.raises(SimulationFailure, match="worker processes keep ending unexpectedly"):
-            run_job(arches(2), {"linear": 2}, JobSettings(jobs=2))
+            optimize_kit(arches(2), {"linear": 2}, settings=JobSettings(jobs=2))
 
 
-_CALL = pool._call
+_RUN_TASK = pool._run_task
 
 
-def _slow_call(*task):
+def _slow_task(task):
     time.sleep(0.15)
-    return _CALL(*task)
+    return _RUN_TASK(task)
 
 
-def _die(*task):
+def _die(task):
     os.kill(os.getpid(), signal.SIGKILL)
 
 

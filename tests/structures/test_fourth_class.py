@@ -17,8 +17,8 @@ from kop_exudyn.errors import InputError
 from kop_exudyn.kit.groups import ElementGroup
 from kop_exudyn.rods.rotations import rotation_z
 from kop_exudyn.scene.builder import SceneBuilder
-from kop_exudyn.search.job import JobSettings, run_job
-from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.structures.base import Design, Role, Target, design_from_dict, register, registered
 
 SECTION = np.array([1e5, 4e4, 4e4, 0.8, 1.0, 1.0])  # slender: EA L^2 / EI is about 1e5
@@ -96,7 +96,7 @@ def test_the_class_is_registered_beside_the_built_in_ones():
 
 
 def test_two_stages_beat_the_direct_projection():
-    outcome = run_job(designs(), {"linear": 3}, JobSettings(jobs=1))
+    outcome = optimize_kit(designs(), {"linear": 3}, settings=JobSettings(jobs=1))
     direct, assigned = outcome.stages["direct"], outcome.stages["assigned"]
     assert assigned.value < 0.5 * direct.value
     for evaluation in assigned.designs:
@@ -109,7 +109,7 @@ def test_two_stages_beat_the_direct_projection():
 def test_results_do_not_depend_on_the_number_of_processes():
     settings = StageSettings(schedule=(1e3, 1e5))
     one, two = (
-        run_job(designs(), {"linear": 3}, JobSettings(jobs=jobs, stages=settings))
+        optimize_kit(designs(), {"linear": 3}, settings=JobSettings(jobs=jobs, stages=settings))
         for jobs in (1, 2)
     )
     np.testing.assert_array_equal(
@@ -119,4 +119,4 @@ def test_results_do_not_depend_on_the_number_of_processes():
 
 def test_more_parts_than_elements_are_refused():
     with pytest.raises(InputError, match="more parts than elements"):
-        run_job(designs(), {"linear": 30}, JobSettings(jobs=1))
+        optimize_kit(designs(), {"linear": 30}, settings=JobSettings(jobs=1))

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from kop_exudyn.errors import SimulationFailure
-from kop_exudyn.search.job import JobOutcome, JobSettings, run_job
+from kop_exudyn.search.result import KitResult
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings
 from kop_exudyn.search.stage_results import StageEvent
 from kop_exudyn.structures.base import Design
 
@@ -55,7 +57,7 @@ def resumed_at(
     parts: Mapping[str, int],
     settings: JobSettings,
     after: bool = False,
-) -> tuple[JobOutcome, list[Any]] | None:
+) -> tuple[KitResult, list[Any]] | None:
     """A job interrupted at its n-th checkpoint and gone on with; None when it ends before.
 
     Returns the outcome and the events that the resumed run reported.
@@ -63,15 +65,17 @@ def resumed_at(
     store = FailingStore(at, KeyboardInterrupt(), after)
     events: list[StageEvent] = []
     try:
-        run_job(designs, parts, settings, store)
+        optimize_kit(designs, parts, settings=settings, store=store)
         return None
     except KeyboardInterrupt:
         again = MemoryStore()
         again.kept = store.kept
-        return run_job(designs, parts, settings, again, events.append), events
+        return optimize_kit(
+            designs, parts, settings=settings, store=again, observer=events.append
+        ), events
 
 
-def fingerprint(outcome: JobOutcome, events: Sequence[Any] = ()) -> dict[str, Any]:
+def fingerprint(outcome: KitResult, events: Sequence[Any] = ()) -> dict[str, Any]:
     """Everything of an outcome that an interruption must not change, bit for bit: no times, no step
     counters of ours."""
     stages = {}

@@ -1,0 +1,183 @@
+"""The whole search: from input designs to one kit, all baselines and both stages. No pages here."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..errors import InputError
+from ..kit.cluster import cluster
+from ..kit.optimality import clustering_gaps
+from ..kit.parts import Kit
+from ..structures.base import Design
+from ..units import common_units
+from .assigned import assigned_stage, opened_stage
+from .dataset import Dataset
+from .objective import Weights
+from .pool import DesignPool
+from .result import KitResult
+from .settings import JobSettings
+from .stage_results import StageEvent
+from .stages import Observer, Stages, Store
+
+
+def optimize_kit(
+    designs: Sequence[Design],
+    parts: Mapping[str, int] | None = None,
+    *,
+    kit: Kit | None = None,
+    start: Sequence[Sequence[float]] | None = None,
+    settings: JobSettings = JobSettings(),
+    store: Store | None = None,
+    observer: Observer | None = None,
+    announce: Callable[[str], None] = lambda phase: None,
+) -> KitResult:
+    """Find a kit of so many parts a kind for all designs; or build the designs from a given kit.
+
+    Parameters
+    ----------
+    designs : what is to be built
+    parts : kind -> number of parts of the kit that is sought
+    kit : instead of `parts`: a kit whose parts stay as they are
+    start : by design, elements (nq,) that a neighbouring kit realises, in place of the direct
+        projection, the baseline and the relaxed stage: the elements are clustered anew, and the
+        assigned stage begins there
+    settings : weights, stages, processes
+    store : keeps checkpoints, from which an interrupted run goes on
+    observer : sees every accepted step
+    announce : is told the phases' names
+
+    Raises
+    ------
+    InputError
+        for impossible requests, before anything is simulated
+    SimulationFailure
+        when an input design can't be simulated
+    """
+    begin = perf_counter()
+    check_request(designs, parts, kit, settings)
+    sought: Mapping[str, int] | Kit = kit if kit is not None else dict(parts or {})
+    events: list[StageEvent] = []
+
+    def observe(event: StageEvent) -> None:
+        events.append(event)
+        if observer is not None:
+            observer(event)
+
+    with DesignPool(designs, settings.jobs) as pool:
+        announce("input designs")
+        pool.prepare()
+        weights = settings.weights or Weights.suiting(designs)
+        dataset = Dataset.of_pool(pool, weights, settings.design_weights)
+        stages = Stages(dataset, sought, settings.stages, store, observe)
+        result = KitResult(list(designs), pool.references, events=events)
+        found = result.stages
+        if start is not None:
+            announce("path from the neighbouring kit")
+            found["built"] = stages.from_neighbour(np.concatenate(list(start)))
+        else:
+            announce("direct projection")
+            found["direct"] = stages.direct()
+            if settings.baselines and kit is None:
+                announce("unrelaxed baseline")
+                found["unrelaxed"] = stages.assigned(found["direct"], "unrelaxed")
+            announce("relaxed stage")
+            relaxed = stages.relaxed(found["direct"].kit)
+            announce("path to the parts")
+            found["relaxed"], found["built"] = stages.to_parts(relaxed)
+        announce("assigned stage")
+        found["assigned"] = assigned_stage(stages, found["built"])
+        announce("deployment of the assigned designs")
+        if settings.stages.redeployments:
+            found["assigned"] = opened_stage(stages, found["assigned"])
+        result.redeployed = stages.redeployed(found["assigned"])
+        if "direct" in found:
+            announce("bound on the clustering")
+            result.clustering = clustering_gaps(
+                dataset.groups,
+                dataset.parameters,
+                found["direct"].kit,
+                bounds=settings.stages.bounds,
+            )
+        result.peak_memory_mb = pool.peak_memory_mb()
+    result.equilibria = dataset.tally.equilibria
+    result.newton_iterations = dataset.tally.newton_iterations
+    result.wall_s = perf_counter() - begin
+    result.settings = described_job(designs, parts, kit, settings) | {"jobs": settings.jobs}
+    return result
+
+
+def check_request(
+    designs: Sequence[Design],
+    parts: Mapping[str, int] | None,
+    kit: Kit | None,
+    settings: JobSettings,
+) -> None:
+    """Raise InputError for what can't be met whatever the simulations say: too many parts or none,
+    a kit without a kind that a design is made of, bounds that exclude each other, constraints on
+    other parameters."""
+    if (parts is None) == (kit is None):
+        raise InputError("give either numbers of parts or a kit", field="parts")
+    units = common_units({design.name: design.units for design in designs})
+    if kit is not None:
+        common_units({"the kit": kit.units, "the designs": units}, "designs and kits")
+    offsets = np.cumsum([0, *(len(design.parameters) for design in designs)])
+    constraints = settings.stages.constraints
+    if constraints is not None and constraints.A.shape[1] != offsets[-1]:
+        raise InputError(
+            f"are on {constraints.A.shape[1]} parameters, the designs have {offsets[-1]}",
+            field="constraints",
+        )
+    if kit is not None:
+        _check_kinds(designs, kit)
+        return
+    groups = [
+        group.shifted(offset) for design, offset in zip(designs, offsets) for group in design.groups
+    ]
+    q = np.concatenate([design.parameters for design in designs])
+    cluster(groups, q, dict(parts or {}), bounds=settings.stages.bounds, restarts=1)
+
+
+def described_job(
+    designs: Sequence[Design],
+    parts: Mapping[str, int] | None,
+    kit: Kit | None,
+    settings: JobSettings,
+) -> dict[str, Any]:
+    """All that the result depends on, as plain data; the number of processes is not part of it."""
+    constraints = settings.stages.constraints
+    values = asdict(replace(settings, stages=replace(settings.stages, constraints=None)))
+    values["weights"] = settings.weights and settings.weights.to_dict()
+    if constraints is not None:
+        rows = sp.csr_array(constraints.A)
+        rows.sort_indices()
+        numbers = (rows.indptr, rows.indices, rows.data, constraints.lower, constraints.upper)
+        values["stages"]["constraints"] = {"rows": constraints.rows, "digest": digest(*numbers)}
+    del values["jobs"]
+    sizes = dict(parts) if kit is None else kit.sizes  # type: ignore[arg-type]
+    given = {} if kit is None else {"kit": kit.to_dict()}
+    return {"designs": [design.name for design in designs], "parts": sizes, **values, **given}
+
+
+def digest(*arrays: np.ndarray) -> str:
+    """SHA-256 of arrays of numbers."""
+    return hashlib.sha256(
+        b"".join(np.ascontiguousarray(a, dtype=float).tobytes() for a in arrays)
+    ).hexdigest()
+
+
+def _check_kinds(designs: Sequence[Design], kit: Kit) -> None:
+    for design in designs:
+        for kind in dict.fromkeys(group.kind for group in design.groups):
+            if kind not in kit.sizes:
+                raise InputError(
+                    f"the kit has no {kind} parts, which {design.name} is made of",
+                    field="kit",
+                    value=", ".join(kit.sizes),
+                )
