@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..drawing.style import save_figure
+from ..files.files import make_folder
 from ..io.kits import save_kit
 from ..io.results import save_result, save_states
 from ..kit.kinds import part_kind
@@ -21,12 +22,16 @@ from .viewer import save_viewer
 from .viewer_scenes import kit_scene
 
 
-def write_kit_report(result: KitResult, folder: Path) -> Path:
+def write_kit_report(result: KitResult, folder: str | Path) -> Path:
     """Write result.json, kit.json, states.npz, figures, viewer.html and index.html; files of those
     names are replaced.
 
+    result : of a search
+    folder : made where it isn't there yet
+
     Returns the page's path. Raises InputError when a file can't be written.
     """
+    folder = make_folder(folder)
     save_result(folder / "result.json", result.to_dict(), overwrite=True)
     save_kit(folder / "kit.json", result.kit, overwrite=True)
     save_states(folder / "states.npz", final_states(result), overwrite=True)

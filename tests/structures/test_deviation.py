@@ -6,10 +6,9 @@ import pytest
 import kop_exudyn as kop
 from kop_exudyn.analysis.simulation import simulate
 from kop_exudyn.exchange.result_tables import result_tables
-from kop_exudyn.search.run import optimize_kit
-from kop_exudyn.search.settings import JobSettings
 from kop_exudyn.search.result import KitResult
-from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.structures.base import design_from_dict
 from kop_exudyn.structures.deviation import deviation
 from kop_exudyn.structures.fitting import TargetFitting
