@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
+from kop_exudyn.compiled.library import library
 from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.equilibrium.system import System
-from kop_exudyn.equilibrium.warm_up import warm_up
 from kop_exudyn.files.json_files import read_json
 from kop_exudyn.io.designs import load_design
 from lib import benchmark_goals as goals
@@ -47,7 +47,7 @@ def main() -> None:
     own.add_argument("--released", type=Path, default=ROOT.parent / "shared" / "data" / "umbrella")
     released, rest = own.parse_known_args()
     study = Study.from_command_line(__doc__, __file__, rest)
-    warm_up()
+    library()  # compiled now, where it has to be
     quick = study.quick
     refinements, runs = ((1, 2), 1) if quick else ((1, 2, 3, 4, 6, 8), 3)
 

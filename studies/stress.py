@@ -26,9 +26,9 @@ import numpy as np
 import pytest
 from tqdm import tqdm
 
+from kop_exudyn.compiled.library import library
 from kop_exudyn.drawing.style import PALETTE, style
 from kop_exudyn.equilibrium.newton import Start
-from kop_exudyn.equilibrium.warm_up import warm_up
 from kop_exudyn.report.environment import peak_memory_mb
 from kop_exudyn.rods.rotations import exp_so3
 from kop_exudyn.search.run import optimize_kit
@@ -60,7 +60,7 @@ Tried = list[tuple[StressCase, Outcome]]
 def main() -> None:
     study = Study.from_command_line(__doc__, __file__)
     share = 100 if study.quick else 1
-    warm_up()
+    library()  # compiled now, where it has to be
     classical = classical_cases()
     random = [tried(seed) for seed in tqdm(range(1000 // share), "random structures", disable=None)]
     symmetric = [

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from kop_exudyn.equilibrium.warm_up import warm_up
+from kop_exudyn.compiled.library import library
 from kop_exudyn.io.datasets import load_designs
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
@@ -43,7 +43,7 @@ def main() -> None:
     )
 
     # 1. Compiled before the clock starts; one job, so that all work is done in this process.
-    warm_up()
+    library()  # compiled now, where it has to be
     clock = PhaseClock()
     with clock.running():
         costs = StepCosts(clock)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kop_exudyn.compiled.library import OFF, library
 from kop_exudyn.fabrication.pieces import parts_list
 from kop_exudyn.kit.cluster import cluster
 from kop_exudyn.structures.base import design_from_dict
@@ -29,6 +30,19 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip("needs the released data files beside the repository")
     return folder
+
+
+@pytest.fixture(params=["compiled", "numpy"], scope="module")
+def kernels(request):
+    """Compiled kernels, then NumPy in their place, for everything that is made meanwhile."""
+    with pytest.MonkeyPatch.context() as patch:
+        if request.param == "numpy":
+            patch.setenv(OFF, "0")
+        library.cache_clear()
+        if request.param == "compiled" and library() is None:
+            pytest.skip("there are no compiled kernels")
+        yield request.param
+    library.cache_clear()
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ FOLDERS = (
     "errors",
     "plugins",
     "units",
+    "compiled",
     "geometry",
     "sqp",
     "files",

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from ..compiled.library import library
 from ..equilibrium.exudyn_model import Confirmation, ExudynModel
 from ..equilibrium.newton import Equilibrium, refine
-from ..equilibrium.warm_up import warm_up
 from ..errors import SimulationFailure
 from ..structures.base import Design
 from ..structures.deviation import fit_summary
@@ -103,7 +103,7 @@ def simulate(design: Design, loads: LoadCase | None = None) -> SimulationResult:
     `loaded_state`).
     """
     loads = design.loads if loads is None else loads
-    warm_up()
+    library()  # compiled now, where it has to be
     begin = perf_counter()
     try:
         equilibria = dict(design.deploy())

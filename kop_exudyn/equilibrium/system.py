@@ -10,21 +10,12 @@ from time import perf_counter
 import numpy as np
 import scipy.sparse as sp
 
-from ..scene.assembly import (
-    ENERGY,
-    GRADIENT,
-    HESSIAN,
-    assemble_rods,
-    largest_forces,
-    predict_stress,
-    scatter_blocks,
-    scratch_arrays,
-)
+from ..scene.assembly import ENERGY, GRADIENT, HESSIAN, rod_assembly
 from ..scene.scene import Scene
 from ..scene.sparsity import sparsity_of
 from ..scene.state import State
 from .block_solve import Solutions
-from .factorisation import Factorisation
+from .factorisation import factorisation
 
 
 @dataclass
@@ -67,19 +58,15 @@ class System:
         self.scene = scene
         self._thread = threading.get_ident()
         self.sparsity = s = sparsity_of(scene)
-        n_elements = len(scene.elements)
-        self.values = np.zeros(s.n_values)
-        self.gradient = np.zeros(s.n_free + s.n_driven)
-        self.strain = np.zeros((n_elements, 6))
-        self.strain_displacement = np.zeros((n_elements, 6, 14))
-        self.predicted_stress = np.zeros((n_elements, 6))
+        self.rods = rod_assembly(scene, s)
+        self.values, self.gradient = self.rods.values, self.rods.gradient
+        self.strain = self.rods.strain
+        self.strain_displacement = self.rods.strain_displacement
+        self.predicted_stress = self.rods.predicted_stress
         self.lengths = scene.length_constant.copy()
-        self.factorisation = Factorisation()
+        self.factorisation = factorisation()
         self.counters = Counters()
-        self._weight = scene.weight if scene.weight is not None else np.zeros((0, 3))
-        self._scratch = scratch_arrays()
         self._matrix = s.free_matrix(self.values)
-        self._plain = scene.plain_nodes
         self.metric = self._metric()
         self.constraint = self._constraint()
         self._forces: tuple[float, float] | None = None  # of the state assembled last
@@ -150,33 +137,7 @@ class System:
             self.gradient[:] = 0.0
         if order == HESSIAN:
             self.values[:] = 0.0
-        elastic, load = assemble_rods(
-            order,
-            state.positions,
-            state.rotations,
-            state.angles,
-            scene.hinge_axis,
-            scene.hinge_centre,
-            scene.node_body,
-            scene.node_hinge,
-            self._plain,
-            scene.node_frame,
-            scene.node_offset,
-            scene.elements,
-            self.lengths,
-            scene.rest_strain,
-            scene.stiffness,
-            self._weight,
-            self.predicted_stress,
-            mixed,
-            s.rows,
-            s.slots,
-            self.gradient,
-            self.values,
-            self.strain,
-            self.strain_displacement,
-            self._scratch,
-        )
+        elastic, load = self.rods.assemble(state, self.lengths, order, mixed)
         potential = elastic + load
         for term, rows, slots in zip(scene.terms, s.term_rows, s.term_slots):
             if order == ENERGY:
@@ -184,7 +145,7 @@ class System:
             else:
                 energy, g, H = term.gradient_hessian(state)
                 potential += energy
-                scatter_blocks(rows, slots, g, H, order == HESSIAN, self.gradient, self.values)
+                self.rods.scatter(rows, slots, g, H if order == HESSIAN else None)
         count.energies += order == ENERGY
         count.gradients += order == GRADIENT
         count.hessians += order == HESSIAN
@@ -196,15 +157,7 @@ class System:
         last."""
         kept = np.zeros(len(self.gradient))
         kept[: self.sparsity.n_free] = increment
-        predict_stress(
-            self.strain,
-            self.strain_displacement,
-            self.sparsity.rows,
-            kept,
-            self.scene.stiffness,
-            self.lengths,
-            self.predicted_stress,
-        )
+        self.rods.predict_stress(self.lengths, kept)
 
     def stress(self) -> np.ndarray:
         """Generalised stresses (E, 6) of the state assembled last."""
@@ -271,7 +224,7 @@ class System:
         """
         if self._forces is None:
             scene = self.scene
-            force, moment, stretch = largest_forces(self.strain, scene.stiffness, self.lengths)
+            force, moment, stretch = self.rods.largest_forces(self.lengths)
             self._forces = (
                 float(np.maximum(force, moment / scene.length_scale)),
                 float(np.finfo(float).eps * scene.size * stretch),

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..rods.rotations import bend_coefficient, exp_se3, log_so3
+from ..rods.rotations import bend_coefficients, exp_se3, log_so3
 from ..scene.scene import Scene
 from ..scene.state import State
 
@@ -96,7 +96,7 @@ def _twists(x: np.ndarray, R: np.ndarray) -> np.ndarray:
     `rods.element`."""
     phi = log_so3(np.swapaxes(R[:-1], 1, 2) @ R[1:])
     p = np.einsum("nji,nj->ni", R[:-1], x[1:] - x[:-1])
-    c = np.array([bend_coefficient(float(s))[0] for s in np.einsum("ni,ni->n", phi, phi)])[:, None]
+    c = bend_coefficients(np.einsum("ni,ni->n", phi, phi))[0][:, None]
     return np.concatenate(
         [p - 0.5 * np.cross(phi, p) + c * np.cross(phi, np.cross(phi, p)), phi], axis=1
     )

@@ -9,10 +9,12 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from .. import __version__
+from ..compiled.build import instruction_set
+from ..compiled.library import library
 from ..search import memory
 
 # the packages whose versions can change numbers
-_PACKAGES = ("exudyn", "numpy", "scipy", "numba", "qdldl", "osqp", "piqp", "libigl")
+_PACKAGES = ("exudyn", "numpy", "scipy", "qdldl", "osqp", "piqp", "libigl")
 
 
 def environment() -> dict[str, Any]:
@@ -22,6 +24,7 @@ def environment() -> dict[str, Any]:
         "kop_exudyn": __version__,
         "python": platform.python_version(),
         **{name: found for name in _PACKAGES if (found := _version(name)) is not None},
+        "kernels": "NumPy" if library() is None else f"compiled, {instruction_set() or 'plain'}",
         "system": platform.system(),
         "processor": platform.machine(),
         "cores": usable_cores(),

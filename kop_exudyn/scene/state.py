@@ -27,8 +27,7 @@ class State:
         angles."""
         n = len(self.positions)
         pose = increment[: 6 * n].reshape(n, 6)
-        rotations = np.empty_like(self.rotations)
-        compose_increments(self.rotations, np.ascontiguousarray(pose[:, 3:]), rotations)
+        rotations = compose_increments(self.rotations, pose[:, 3:])
         return State(self.positions + pose[:, :3], rotations, self.angles + increment[6 * n :])
 
     def increment_to(self, other: State) -> np.ndarray:

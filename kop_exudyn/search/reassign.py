@@ -16,10 +16,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numba as nb
 import numpy as np
 import scipy.sparse as sp
 
+from ..compiled.library import address, library
 from ..kit.kinds import part_kind
 from ..kit.parts import Assignment, Kit
 from ..sqp.qp import QP, QPSolver
@@ -177,38 +177,50 @@ def _sweep(
     )
 
 
-@nb.njit(cache=True)
-def _descend(q, slope, hessian, indices, candidates, choice, least):
+def _descend(
+    q: np.ndarray,
+    slope: np.ndarray,
+    hessian: np.ndarray,
+    indices: np.ndarray,
+    candidates: np.ndarray,
+    choice: np.ndarray,
+    least: float,
+) -> int:
     """Coordinate descent over one group of elements until none gains; q, slope and choice are
-    brought up to date.
+    brought up to date. Returns how many changes there were.
 
     least : gain that counts; without one, two elements might swap forever
     """
-    n, k = indices.shape
+    kernels = library()
+    if kernels is None:
+        return _descend_numpy(q, slope, hessian, indices, candidates, choice, least)
+    hessian, indices = np.ascontiguousarray(hessian), np.ascontiguousarray(indices, np.int64)
+    candidates = np.ascontiguousarray(candidates, float)
+    return kernels.descend(
+        *indices.shape,
+        len(candidates),
+        len(q),
+        address(q),
+        address(slope),
+        address(hessian),
+        address(indices, np.int64),
+        address(candidates),
+        address(choice, np.int64),
+        least,
+    )
+
+
+def _descend_numpy(q, slope, hessian, indices, candidates, choice, least) -> int:
     total, changed = 0, 1
     while changed:
         changed = 0
-        for e in range(n):
-            best, which = -least, choice[e]
-            for c in range(len(candidates)):
-                gain = 0.0
-                for i in range(k):
-                    d_i = candidates[c, i] - q[indices[e, i]]
-                    gain += slope[indices[e, i]] * d_i
-                    for j in range(k):
-                        gain += (
-                            0.5
-                            * d_i
-                            * hessian[indices[e, i], indices[e, j]]
-                            * (candidates[c, j] - q[indices[e, j]])
-                        )
-                if gain < best:
-                    best, which = gain, c
-            if which != choice[e]:
-                for i in range(k):
-                    d_i = candidates[which, i] - q[indices[e, i]]
-                    slope += hessian[indices[e, i]] * d_i
-                    q[indices[e, i]] = candidates[which, i]
+        for e, own in enumerate(indices):
+            d = candidates - q[own]
+            gains = d @ slope[own] + 0.5 * np.einsum("ci,ij,cj->c", d, hessian[np.ix_(own, own)], d)
+            which = int(np.argmin(gains))
+            if gains[which] < -least and which != choice[e]:
+                slope += d[which] @ hessian[own]
+                q[own] = candidates[which]
                 choice[e] = which
                 changed += 1
         total += changed

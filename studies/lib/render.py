@@ -12,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numba as nb
 import numpy as np
 
+from kop_exudyn.compiled.library import address, library
 from kop_exudyn.drawing.colours import to_linear, to_srgb
 
 _SUN, _SKY = 0.62, 0.62  # share of the light
@@ -231,35 +231,45 @@ def _unshaded(
     return reached
 
 
-@nb.njit(cache=True)
-def _rasterise(xy, value, faces, w, h):
+def _rasterise(
+    xy: np.ndarray, value: np.ndarray, faces: np.ndarray, w: int, h: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Face (h, w) of the largest value in each pixel (-1: none), and that value; linear over the
     picture."""
-    owner = np.full((h, w), -1, np.int64)
-    best = np.zeros((h, w))
-    for f in range(len(faces)):
-        a, b, c = faces[f]
-        ax, ay, bx, by, cx, cy = xy[a, 0], xy[a, 1], xy[b, 0], xy[b, 1], xy[c, 0], xy[c, 1]
+    kernels = library()
+    if kernels is None:
+        return _rasterise_numpy(xy, value, faces, w, h)
+    xy, value = np.ascontiguousarray(xy, float), np.ascontiguousarray(value, float)
+    faces = np.ascontiguousarray(faces, np.int64)
+    owner, best = np.empty((h, w), np.int64), np.empty((h, w))
+    kernels.rasterise(
+        len(faces),
+        address(faces, np.int64),
+        address(xy),
+        address(value),
+        w,
+        h,
+        address(owner, np.int64),
+        address(best),
+    )
+    return owner, best
+
+
+def _rasterise_numpy(xy, value, faces, w, h) -> tuple[np.ndarray, np.ndarray]:
+    owner, best = np.full((h, w), -1, np.int64), np.zeros((h, w))
+    for f, corners in enumerate(faces):
+        (ax, ay), (bx, by), (cx, cy) = triangle = xy[corners]
         area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
         if area == 0:
             continue
-        left, right = (
-            max(int(np.floor(min(ax, bx, cx) - 0.5)), 0),
-            min(int(np.ceil(max(ax, bx, cx) + 0.5)), w - 1),
-        )
-        top, bottom = (
-            max(int(np.floor(min(ay, by, cy) - 0.5)), 0),
-            min(int(np.ceil(max(ay, by, cy) + 0.5)), h - 1),
-        )
-        for y in range(top, bottom + 1):
-            py = y + 0.5
-            for x in range(left, right + 1):
-                px = x + 0.5
-                u = ((bx - px) * (cy - py) - (by - py) * (cx - px)) / area
-                v = ((cx - px) * (ay - py) - (cy - py) * (ax - px)) / area
-                if u >= 0 and v >= 0 and u + v <= 1:
-                    z = u * value[a] + v * value[b] + (1 - u - v) * value[c]
-                    if z > best[y, x]:
-                        best[y, x] = z
-                        owner[y, x] = f
+        left, top = np.maximum(np.floor(triangle.min(0) - 0.5).astype(int), 0)
+        right, bottom = np.minimum(np.ceil(triangle.max(0) + 0.5).astype(int), (w - 1, h - 1)) + 1
+        px, py = np.arange(left, right) + 0.5, np.arange(top, bottom)[:, None] + 0.5
+        u = ((bx - px) * (cy - py) - (by - py) * (cx - px)) / area
+        v = ((cx - px) * (ay - py) - (cy - py) * (ax - px)) / area
+        z = u * value[corners[0]] + v * value[corners[1]] + (1 - u - v) * value[corners[2]]
+        window = slice(top, max(bottom, top)), slice(left, max(right, left))
+        inside = (u >= 0) & (v >= 0) & (u + v <= 1) & (z > best[window])
+        best[window][inside] = z[inside]
+        owner[window][inside] = f
     return owner, best

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from kop_exudyn.compiled.library import library
 from kop_exudyn.equilibrium.exudyn_model import ExudynModel
 from kop_exudyn.equilibrium.newton import refine
-from kop_exudyn.equilibrium.warm_up import warm_up
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.structures.fitting import best_placement
@@ -27,7 +27,7 @@ def compared_plates(file: Path, runs: int) -> dict[str, Any]:
     Seconds are of processor time, the median of several runs. Joints are compared after the best
     rigid motion, in % of the bounding-box diagonal of those between plates of rods.
     """
-    warm_up()
+    library()  # compiled now, where it has to be
     design = _umbrella(file)
     rows, joints, energies = [], {}, {}
     for model in PLATE_MODELS:

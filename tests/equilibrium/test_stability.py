@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kop_exudyn.equilibrium.direction import Border, bordered_solve, factorise_convex, is_convex
-from kop_exudyn.equilibrium.factorisation import Factorisation
+from kop_exudyn.equilibrium.factorisation import factorisation
 from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.equilibrium.stability import softest_mode, stiffness_matrix
 from kop_exudyn.equilibrium.system import System
@@ -34,23 +34,21 @@ def symmetric(rng, n: int, negative: int) -> np.ndarray:
 def test_pivots_are_the_inertia_and_solves_are_solves(seed, n, negative, columns):
     rng = np.random.default_rng(seed)
     K = symmetric(rng, n, min(negative, n))
-    factorisation = Factorisation()
+    factors = factorisation()
     for _ in range(2):  # the second time through the numeric refactorisation
-        assert factorisation.update(sp.csc_matrix(np.triu(K))) == min(negative, n)
+        assert factors.update(sp.csc_matrix(np.triu(K))) == min(negative, n)
         rhs = rng.normal(size=(n, columns)) * (rng.random((n, columns)) < 0.3)
-        assert np.allclose(K @ factorisation.solve(rhs), rhs, atol=1e-7)
-        assert np.allclose(
-            factorisation.solve(rhs)[:, 0], factorisation.solve(rhs[:, 0]), atol=1e-8
-        )
+        assert np.allclose(K @ factors.solve(rhs), rhs, atol=1e-7)
+        assert np.allclose(factors.solve(rhs)[:, 0], factors.solve(rhs[:, 0]), atol=1e-8)
         K = K + 0.0
 
 
 def test_a_singular_matrix_is_counted_as_not_positive():
-    factorisation = Factorisation()
+    factors = factorisation()
     singular = sp.csc_matrix(([1.0, 0.0], ([0, 1], [0, 1])), shape=(2, 2))
-    assert factorisation.update(singular) >= 1
-    assert factorisation.update(sp.csc_matrix(np.triu([[2.0, 1], [1, 2]]))) == 0
-    assert np.allclose(factorisation.solve(np.array([3.0, 3.0])), 1)
+    assert factors.update(singular) >= 1
+    assert factors.update(sp.csc_matrix(np.triu([[2.0, 1], [1, 2]]))) == 0
+    assert np.allclose(factors.solve(np.array([3.0, 3.0])), 1)
 
 
 @settings(max_examples=60, deadline=None)

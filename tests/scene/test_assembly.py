@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from kop_exudyn.equilibrium.system import System
+from kop_exudyn.rods import element
 from kop_exudyn.rods.rotations import axes_along_z
 from kop_exudyn.scene.assembly import ENERGY, GRADIENT, HESSIAN
 from kop_exudyn.scene.state import State
-from support import element_numpy
 
+pytestmark = pytest.mark.usefixtures("kernels")
 SEEDS = [0, 1, 2, 3, 4]
 
 
@@ -21,7 +22,7 @@ def potential_by_hand(scene, q, state) -> tuple[float, float]:
     x, R = scene.node_poses(state)
     tail, head = scene.elements.T
     L = scene.rest_lengths(q)
-    elastic = element_numpy.evaluate(
+    elastic = element.evaluate(
         x[tail], R[tail], x[head], R[head], L, scene.stiffness, scene.rest_strain
     )[0].sum()
     load = -0.5 * np.einsum("e,ei,ei->", L, scene.weight, x[tail] + x[head])
