@@ -9,7 +9,7 @@ import pytest
 import scipy.sparse as sp
 
 from kop_exudyn.equilibrium.direction import border_of, bordered_solve
-from kop_exudyn.equilibrium.factorisation import Factorisation
+from kop_exudyn.equilibrium.factorisation import factorisation
 from kop_exudyn.equilibrium.newton import refine, solve
 from kop_exudyn.equilibrium.sensitivities import Sensitivities
 from kop_exudyn.equilibrium.stability import softest_mode, stiffness_matrix
@@ -156,14 +156,14 @@ def test_a_border_serves_its_own_factorisation_only(wheel):
 
 def test_a_singular_matrix_lends_no_earlier_factors():
     """Block solves went on with the factors of the matrix before."""
-    factorisation = Factorisation()
-    factorisation.update(sp.csc_matrix(np.triu([[2.0, 1], [1, 2]])))
+    factors = factorisation()
+    factors.update(sp.csc_matrix(np.triu([[2.0, 1], [1, 2]])))
     singular = sp.csc_matrix(([1.0, 1.0, 1.0], ([0, 0, 1], [0, 1, 1])), shape=(2, 2))
-    assert factorisation.update(singular) == 1
+    assert factors.update(singular) == 1
     with pytest.raises(SimulationFailure, match="singular"):
-        factorisation.solve_columns(sp.identity(2, format="csc"))
+        factors.solve_columns(sp.identity(2, format="csc"))
     with pytest.raises(SimulationFailure, match="singular"):
-        factorisation.solve(np.ones(2))
+        factors.solve(np.ones(2))
 
 
 # -- threads -----------------------------------------------------------------------------------
