@@ -86,7 +86,7 @@ class System:
     @property
     def conservative(self) -> bool:
         """Whether a potential exists (a spatial moment has none)."""
-        return all(getattr(term, "conservative", True) for term in self.scene.terms)
+        return all(term.conservative for term in self.scene.terms)
 
     @property
     def singular(self) -> bool:

@@ -19,11 +19,12 @@ import numpy as np
 
 from ..errors import InputError
 from .state import State
+from .terms import SceneTerm
 
 _I3 = np.eye(3)
 
 
-class LinearActuators:
+class LinearActuators(SceneTerm):
     """The actuators of m cells.
 
     Parameters

@@ -16,11 +16,12 @@ import numpy as np
 from ..errors import InputError
 from ..geometry.triangles import TriangleSurface
 from .state import State
+from .terms import SceneTerm
 
 _I3 = np.eye(3)
 
 
-class Attraction:
+class Attraction(SceneTerm):
     """Springs from m query points.
 
     Parameters

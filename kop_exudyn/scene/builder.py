@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..rods.sections import Section
 from .scene import Chain, Driven, Scene
 from .state import State
+from .terms import SceneTerm
 
 _ALL = (0, 1, 2, 3, 4, 5)
 _Z = (0.0, 0.0, 1.0)
@@ -39,7 +40,7 @@ class SceneBuilder:
         self._driven: list[tuple[int, int, int, float, float]] = []
         self._pins: list[tuple[int, int]] = []
         self._actuated: np.ndarray | None = None
-        self._terms: list[Any] = []
+        self._terms: list[SceneTerm] = []
 
     def bodies(self, positions: Any, rotations: Any = None) -> np.ndarray:
         """Add bodies at positions (n, 3) with axes rotations (n, 3, 3) (default: the global axes);
@@ -191,7 +192,7 @@ class SceneBuilder:
         is the torque."""
         self._actuated = np.array(hinges, int).reshape(-1)
 
-    def term(self, term: Any) -> None:
+    def term(self, term: SceneTerm) -> None:
         """Add a load, an attraction or an actuator."""
         self._terms.append(term)
 

@@ -19,9 +19,10 @@ import numpy as np
 from ..errors import InputError
 from .scene import Scene
 from .state import State
+from .terms import SceneTerm
 
 
-class DeadForces:
+class DeadForces(SceneTerm):
     """Forces that keep direction and size, on m points of bodies.
 
     Parameters
@@ -59,7 +60,7 @@ class DeadForces:
         return self.energy(state), -np.concatenate([self.forces, np.cross(o, F)], axis=1), H
 
 
-class BodyMoments:
+class BodyMoments(SceneTerm):
     """Moments that turn with their bodies. No potential; the symmetric part of the tangent is zero.
 
     bodies : (m,)
@@ -94,7 +95,7 @@ class SpatialMoments(BodyMoments):
         return np.einsum("mji,mj->mi", state.rotations[self.bodies], self.moments)
 
 
-class HingeTorques:
+class HingeTorques(SceneTerm):
     """Torques on hinges, equal and opposite on the hinge's two sides: -tau a is their potential.
 
     Parameters
@@ -125,17 +126,17 @@ class HingeTorques:
         return self.energy(state), -self.torques[:, None], np.zeros((len(self.hinges), 1, 1))
 
 
-class Scaled:
+class Scaled(SceneTerm):
     """Another term times a factor that may be set at any time: the load factor of a path.
 
     term : any term
     factor : multiplies its energy and derivatives
     """
 
-    def __init__(self, term: Any, factor: float = 1.0):
+    def __init__(self, term: SceneTerm, factor: float = 1.0):
         self.term, self.factor = term, factor
         self.dofs = term.dofs
-        self.conservative = getattr(term, "conservative", True)
+        self.conservative = term.conservative
 
     def energy(self, state: State) -> float:
         return self.factor * self.term.energy(state)

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from ..errors import SimulationFailure
 from ..rods.rotations import exp_so3
 from ..rods.sections import Section
 from .state import State
+from .terms import SceneTerm
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class Scene:
     driven: Driven
     pinned: np.ndarray
     actuated: np.ndarray | None
-    terms: tuple[Any, ...]
+    terms: tuple[SceneTerm, ...]
     chains: tuple[Chain, ...]
 
     @property
@@ -105,7 +105,7 @@ class Scene:
         """Unknowns before pins and driven ones are taken out."""
         return 6 * self.n_bodies + self.n_hinges
 
-    def with_terms(self, *terms: Any) -> Scene:
+    def with_terms(self, *terms: SceneTerm) -> Scene:
         """The same scene with these loads, attractions and actuators instead."""
         return replace(self, terms=tuple(terms))
 
