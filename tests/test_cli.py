@@ -65,7 +65,7 @@ def quiet_loggers():
 def design_file(monkeypatch, write_json_file):
     """A design of a class whose reader only keeps the name."""
     monkeypatch.setitem(
-        base._REGISTRY,
+        base.CLASSES.items,
         "named",
         lambda data, source: SimpleNamespace(name=data["name"], fit_weight=1e5),
     )

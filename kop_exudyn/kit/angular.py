@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .kinds import PartKind, Variants, register
+from .kinds import PartKind, Variants, register_kind
 
-ANGULAR = register(
+ANGULAR = register_kind(
     PartKind(
         name="angular",
         parameter_names=("angle",),

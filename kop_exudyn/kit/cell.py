@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .kinds import PartKind, Variants, register
+from .kinds import PartKind, Variants, register_kind
 
-CELL = register(
+CELL = register_kind(
     PartKind(
         name="cell",
         parameter_names=("top", "bottom"),

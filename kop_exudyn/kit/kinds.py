@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..plugins import load_folder
+from ..plugins import Registry
 
 Bounds = Mapping[str, tuple]  # kind -> (lower, upper), each a number or an array (k_p,)
 
@@ -164,29 +164,25 @@ class PartKind:
         return lower, upper
 
 
-_REGISTRY: dict[str, PartKind] = {}
+KINDS: Registry[PartKind] = Registry(__package__)
 
 
-def register(kind: PartKind) -> PartKind:
-    """Make a kind known under its name."""
-    _REGISTRY[kind.name] = kind
+def register_kind(kind: PartKind) -> PartKind:
+    """Make a kind of parts known under its name."""
+    KINDS.add(kind.name, kind)
     return kind
 
 
 def kind_names() -> list[str]:
     """Names of all kinds, sorted."""
-    load_folder(__package__)
-    return sorted(_REGISTRY)
+    return KINDS.names()
 
 
 def part_kind(name: str) -> PartKind:
     """The kind of that name; InputError when there is none."""
-    if name not in _REGISTRY:
-        load_folder(__package__)
-    if name not in _REGISTRY:
+    kind = KINDS.get(name)
+    if kind is None:
         raise InputError(
-            f"unknown kind of parts (known: {', '.join(sorted(_REGISTRY))})",
-            field="parts",
-            value=name,
+            f"unknown kind of parts (known: {', '.join(kind_names())})", field="parts", value=name
         )
-    return _REGISTRY[name]
+    return kind

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .kinds import PartKind, Variants, register
+from .kinds import PartKind, Variants, register_kind
 
-LINEAR = register(
+LINEAR = register_kind(
     PartKind(
         name="linear",
         parameter_names=("l1", "l2"),

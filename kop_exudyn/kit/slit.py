@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .kinds import PartKind, Variants, register
+from .kinds import PartKind, Variants, register_kind
 
 _SIDE_1, _SIDE_2, _SLIT = [1, 0, 0], [0, 1, 0], [0, 0, 1]
 
@@ -20,7 +20,7 @@ def _sorted_sides(parts: np.ndarray) -> np.ndarray:
     return np.column_stack([np.sort(parts[:, :2], axis=1), parts[:, 2]])
 
 
-SLIT = register(
+SLIT = register_kind(
     PartKind(
         name="slit",
         parameter_names=("l1", "l2", "slit"),

@@ -12,6 +12,7 @@ from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
 from threadpoolctl import threadpool_limits
 
 from ..errors import SimulationFailure
+from ..plugins import adopt, registered_elsewhere
 from ..structures.base import Design
 from .memory import peak_memory_mb
 from .objective import DesignObjective, Reference, Weights, reference_of
@@ -31,8 +32,9 @@ def _initialise(designs: list[Design]) -> None:
     _objectives.clear()
 
 
-def _start_worker(designs: list[Design]) -> None:
+def _start_worker(designs: list[Design], extensions: Mapping[str, Mapping[str, Any]]) -> None:
     one_thread()
+    adopt(extensions)
     _initialise(designs)
 
 
@@ -170,7 +172,7 @@ class DesignPool:
             n_jobs=self.jobs,
             backend="loky",
             initializer=_start_worker,
-            initargs=(self.designs,),
+            initargs=(self.designs, registered_elsewhere()),
             batch_size=1,
             pre_dispatch="all",
         )

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..kit.groups import ElementGroup
-from ..plugins import load_folder
+from ..plugins import Registry
 from ..units import Units, units_from_dict
 from .loads import LoadCase, load_case_from_dict
 
@@ -150,24 +150,26 @@ class Design(ABC):
 
 Reader = Callable[[Mapping[str, Any], str], Design]
 R = TypeVar("R", bound=Reader)
-_REGISTRY: dict[str, Reader] = {}
+CLASSES: Registry[Reader] = Registry(__package__)
 
 
-def register(class_name: str) -> Callable[[R], R]:
+def register_class(class_name: str) -> Callable[[R], R]:
     """Decorator: the reader that makes a `Design` of a design file's content (a mapping) and its
-    source name."""
+    source name.
+
+    class_name : the field "class" of such files
+    """
 
     def add(reader: R) -> R:
-        _REGISTRY[class_name] = reader
+        CLASSES.add(class_name, reader)
         return reader
 
     return add
 
 
-def registered() -> Iterator[str]:
-    """Names of all structure classes, those of this folder included."""
-    load_folder(__package__)
-    return iter(sorted(_REGISTRY))
+def class_names() -> list[str]:
+    """Names of all structure classes, sorted: those of this folder, and those of extensions."""
+    return CLASSES.names()
 
 
 def design_from_dict(data: Mapping[str, Any], source: str = "design") -> Design:
@@ -176,17 +178,15 @@ def design_from_dict(data: Mapping[str, Any], source: str = "design") -> Design:
     Raises InputError when the class is unknown or a field is missing, unknown or unusable.
     """
     class_name = data.get("class") if isinstance(data, Mapping) else None
-    if class_name not in _REGISTRY:
-        load_folder(__package__)
-    if class_name not in _REGISTRY:
-        known = ", ".join(sorted(_REGISTRY))
+    reader = CLASSES.get(class_name)
+    if reader is None:
         raise InputError(
-            f"unknown structure class (known: {known})",
+            f"unknown structure class (known: {', '.join(class_names())})",
             source=source,
             field="class",
             value=class_name,
         )
-    design = _REGISTRY[class_name](data, source)
+    design = reader(data, source)
     if "units" in data:
         design.units = units_from_dict(data["units"])
     if "loads" in data or "supports" in data:

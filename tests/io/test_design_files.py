@@ -25,7 +25,7 @@ class Named:
 def named_class(monkeypatch):
     """A structure class without schema, whose reader keeps the content."""
     monkeypatch.setitem(
-        base._REGISTRY, "named", lambda data, source: Named(data["name"], dict(data))
+        base.CLASSES.items, "named", lambda data, source: Named(data["name"], dict(data))
     )
 
 
@@ -168,7 +168,7 @@ def test_errors_of_the_class_name_the_file(monkeypatch, write_json_file):
     def reader(data, source):
         raise InputError("crosses no other", field="curves[1]")
 
-    monkeypatch.setitem(base._REGISTRY, "named", reader)
+    monkeypatch.setitem(base.CLASSES.items, "named", reader)
     file = write_json_file("a.json", design_data("a"))
     with pytest.raises(InputError, match=r"a\.json: curves\[1\]: crosses no other"):
         load_design(file)

@@ -112,12 +112,13 @@ def test_stress_needs_cross_sections(repository):
         DesignObjective(design, Weights.of({"stress": 1.0}))
 
 
-def test_a_term_is_one_class(repository, monkeypatch):
-    """A term from outside the package: the sum of all rest lengths that a design needs, over the
-    input's."""
-    monkeypatch.setattr(base, "_REGISTRY", dict(base._REGISTRY))
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_term_is_one_class(repository, monkeypatch, jobs):
+    """A term from outside the package, in this process and in others: the sum of all rest lengths
+    that a design needs, over the input's."""
+    monkeypatch.setattr(base.TERMS, "items", dict(base.TERMS.items))
 
-    @base.register
+    @base.register_term
     class Material(base.Term):
         name = "material"
 
@@ -142,14 +143,15 @@ def test_a_term_is_one_class(repository, monkeypatch):
         def _used(self, q):
             return sum(q[g.indices].sum() for g in self.design.groups if g.kind == "linear")
 
-    design = load_design(repository / "models" / "grids" / "01_dome.json")
+    designs = [load_design(repository / "models" / "grids" / "01_dome.json") for _ in range(jobs)]
+    designs[-1].name = "the last one"
     settings = JobSettings(
         Weights.of({"material": 20.0}),
-        jobs=1,
+        jobs=jobs,
         baselines=False,
-        stages=StageSettings(schedule=(1e3,), reassignments=0, relaxed_steps=4, assigned_steps=4),
+        stages=StageSettings(schedule=(1e3,), reassignments=0, relaxed_steps=3, assigned_steps=3),
     )
-    outcome = optimize_kit([design], {"linear": 2, "angular": 2}, settings=settings)
+    outcome = optimize_kit(designs, {"linear": 2, "angular": 2}, settings=settings)
     evaluation = outcome.stages["assigned"].designs[0]
     assert 0 < evaluation.terms["material deployed"] < 20.0  # what gives, shrinks
     assert evaluation.confirmations

@@ -19,7 +19,14 @@ from kop_exudyn.rods.rotations import rotation_z
 from kop_exudyn.scene.builder import SceneBuilder
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
-from kop_exudyn.structures.base import Design, Role, Target, design_from_dict, register, registered
+from kop_exudyn.structures.base import (
+    Design,
+    Role,
+    Target,
+    class_names,
+    design_from_dict,
+    register_class,
+)
 
 SECTION = np.array([1e5, 4e4, 4e4, 0.8, 1.0, 1.0])  # slender: EA L^2 / EI is about 1e5
 
@@ -72,7 +79,7 @@ class Arch(Design):
         return Target(strip, np.array(faces), joints, float(np.linalg.norm(np.ptp(joints, axis=0))))
 
 
-@register("toy_arch")
+@register_class("toy_arch")
 def read(data, source):
     if "pieces" not in data:
         raise InputError("missing", source=source, field="pieces")
@@ -91,7 +98,7 @@ def designs():
 
 
 def test_the_class_is_registered_beside_the_built_in_ones():
-    names = list(registered())
+    names = class_names()
     assert "toy_arch" in names and "c_shell" in names
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from ...equilibrium.newton import Equilibrium
 from ...equilibrium.sensitivities import Sensitivities
 from ...errors import InputError
-from ...plugins import load_folder
+from ...plugins import Registry
 from ...structures.base import Design, Role, Target
 from ...structures.fitting import FitResult
 
@@ -70,31 +70,29 @@ class Term(ABC):
         (Gauss-Newton)."""
 
 
-_REGISTRY: dict[str, type[Term]] = {}
+TERMS: Registry[type[Term]] = Registry(__package__)
 _Term = TypeVar("_Term", bound=type[Term])
 
 
-def register(term: _Term) -> _Term:
+def register_term(term: _Term) -> _Term:
     """Make a term known under its name; decorates the class."""
-    _REGISTRY[term.name] = term
+    TERMS.add(term.name, term)
     return term
 
 
 def term_names() -> list[str]:
     """Names of all terms: those that every objective has first, then the others, sorted."""
-    load_folder(__package__)
     first = ["fit", "energy"]
-    return first + sorted(set(_REGISTRY) - set(first))
+    return first + [name for name in TERMS.names() if name not in first]
 
 
 def term_class(name: str) -> type[Term]:
     """The term of that name; InputError when there is none."""
-    if name not in _REGISTRY:
-        load_folder(__package__)
-    if name not in _REGISTRY:
+    term = TERMS.get(name)
+    if term is None:
         raise InputError(
             f"unknown term of the objective (known: {', '.join(term_names())})",
             field="weights",
             value=name,
         )
-    return _REGISTRY[name]
+    return term

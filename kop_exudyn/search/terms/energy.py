@@ -9,10 +9,10 @@ from ...equilibrium.newton import Equilibrium
 from ...equilibrium.sensitivities import Sensitivities
 from ...structures.base import Role
 from ...structures.fitting import FitResult
-from .base import Term, register
+from .base import Term, register_term
 
 
-@register
+@register_term
 class Energy(Term):
     """E / E0 in every state that is solved, E0 that of the input design's fitted state."""
 

@@ -8,10 +8,10 @@ from ...equilibrium.newton import Equilibrium
 from ...equilibrium.sensitivities import Sensitivities
 from ...structures.base import Role
 from ...structures.fitting import FitResult
-from .base import Term, register
+from .base import Term, register_term
 
 
-@register
+@register_term
 class Fit(Term):
     """Target fitting at the best rigid placement, over the square of the target's bounding-box
     diagonal."""

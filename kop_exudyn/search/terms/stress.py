@@ -25,12 +25,12 @@ from ...errors import InputError
 from ...scene.scene import Scene
 from ...structures.base import Design, Role
 from ...structures.fitting import FitResult
-from .base import Reference, Term, register
+from .base import Reference, Term, register_term
 
 _P = 8  # close enough to the maximum, and the curvature still bounded
 
 
-@register
+@register_term
 class Stress(Term):
     """S / S0 in every state that is solved, S0 that of the input design's fitted state."""
 

@@ -31,7 +31,7 @@ from ...geometry.network_faces import triangulate
 from ...geometry.triangles import TriangleSurface
 from ...rods.sections import material_from_dict, section_from_dict
 from ...scene.scene import Scene
-from ..base import Design, Role, Target, register
+from ..base import Design, Role, Target, register_class
 from ..mesh_target import load_target_mesh, target_on_mesh
 from .opening import check_hinges, check_opening
 from .scene import RodModel, lay_out, shell_scene
@@ -225,7 +225,7 @@ def _split(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndar
     return np.concatenate([vertices, vertices[unique].mean(axis=1)]), np.concatenate(parts)
 
 
-@register("c_shell")
+@register_class("c_shell")
 def read_c_shell(data: Mapping[str, Any], source: str) -> CShell:
     """The C-shell of a design file's content (see c_shell.schema.json). Raises InputError."""
     try:

@@ -18,7 +18,7 @@ from ...errors import InputError, SimulationFailure
 from ...geometry.network import CurveNetwork
 from ...geometry.surfaces import AnalyticSurface, Surface
 from ...rods.sections import Material, Section, material_from_dict, section_from_dict
-from ..base import Design, Role, Target, register
+from ..base import Design, Role, Target, register_class
 from ..loads import hold_in_place
 from .grid_network import network_on
 from .lamellas import straighten_on
@@ -196,7 +196,7 @@ def _triangulated(
     return vertices[used], np.searchsorted(used, faces)
 
 
-@register("grid")
+@register_class("grid")
 def read_grid(data: Mapping[str, Any], source: str) -> Grid:
     """The grid of a design file's content (see grid.schema.json). Raises InputError."""
     try:

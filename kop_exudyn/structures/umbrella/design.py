@@ -14,7 +14,7 @@ from ...errors import InputError, SimulationFailure
 from ...kit.groups import ElementGroup
 from ...rods.sections import Material, material_from_dict
 from ...units import Units
-from ..base import Design, Role, Target, register
+from ..base import Design, Role, Target, register_class
 from .bodies import RODS, joint_bodies
 from .layout import BaseMesh, Plates, umbrella_mesh
 from .mesh import UmbrellaMesh, UmbrellaTarget
@@ -293,7 +293,7 @@ class Umbrella(Design):
         return design
 
 
-@register("umbrella")
+@register_class("umbrella")
 def umbrella_from_dict(data: Mapping[str, Any], source: str = "design") -> Umbrella:
     """The design of a file of class "umbrella" (see umbrella.schema.json); raises InputError naming
     the field."""

@@ -20,7 +20,7 @@ from kop_exudyn.kit.groups import ElementGroup
 from kop_exudyn.rods.rotations import rotation_z
 from kop_exudyn.scene.builder import SceneBuilder
 from kop_exudyn.scene.scene import Scene
-from kop_exudyn.structures.base import Design, Role, Target, register
+from kop_exudyn.structures.base import Design, Role, Target, register_class
 
 _SECTION = np.array([1e5, 4e4, 4e4, 0.8, 1.0, 1.0])
 
@@ -74,7 +74,7 @@ class Arch(Design):
         return Target(strip, np.array(faces), joints, float(np.linalg.norm(np.ptp(joints, axis=0))))
 
 
-@register("stress_arch")
+@register_class("stress_arch")
 def read_arch(data: Mapping[str, Any], source: str) -> Arch:
     """The arch of a design file's content. Raises InputError."""
     for field in ("pieces", "span"):
