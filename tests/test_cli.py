@@ -361,7 +361,10 @@ class TestOptimize:
 
     def test_parts_must_come_from_somewhere(self, asked, design_file, tmp_path, capsys):
         assert status_of("optimize", design_file.parent, "--out", tmp_path / "out") == 2
-        assert "--parts or --kit is required" in capsys.readouterr().err and "parts" not in asked
+        assert (
+            "--parts, --kit or --stock is required" in capsys.readouterr().err
+            and "parts" not in asked
+        )
 
     def test_a_kit_that_exists(self, asked, design_file, tmp_path, capsys):
         file = save_kit(
@@ -377,6 +380,20 @@ class TestOptimize:
         assert "give --kit or --parts" in capsys.readouterr().err
         assert status_of(*arguments, tmp_path / "no.json") == 2
         assert "no.json: no such file" in capsys.readouterr().err
+
+    def test_a_stock(self, asked, design_file, tmp_path, capsys):
+        file = tmp_path / "store.csv"
+        file.write_text("kind,count,l1,l2,angle\nlinear,7,0.2,0.1,\nangular,3,,,-0.4\n")
+        arguments = ("optimize", design_file.parent, "--out", tmp_path / "out", "--stock")
+        assert status_of(*arguments, file, "--together") == 0
+        stock = asked["kit"]
+        assert stock.together and stock.to_dict() == {"angular": [3], "linear": [7]}
+        assert stock.kit.to_dict() == {"angular": [0.4], "linear": [[0.1, 0.2]]}
+        assert status_of(*arguments, file) == 0 and not asked["kit"].together
+        assert status_of(*arguments, file, "--parts", "linear=2") == 2
+        assert "give it without --kit and --parts" in capsys.readouterr().err
+        assert status_of(*arguments[:-1], "--together", "--parts", "linear=2") == 2
+        assert "give it with --stock" in capsys.readouterr().err
 
     def test_weights_of_terms(self, asked, design_file, tmp_path, capsys):
         arguments = (

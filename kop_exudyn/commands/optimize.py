@@ -24,7 +24,8 @@ EXAMPLES = """examples:
   kop optimize models/conformals --designs 02_tanh,07_log --parts linear=8,angular=3 --out out/pair
   kop optimize models/conformals --parts linear=12,angular=5 --out out/kit --resume
   kop optimize study.toml --out out/kit --seed 1
-  kop optimize models/conformals --designs 06_moebius --kit out/kit/kit.json --out out/another"""
+  kop optimize models/conformals --designs 06_moebius --kit out/kit/kit.json --out out/another
+  kop optimize models/conformals --designs 3 --stock store.csv --out out/from_stock"""
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,6 +46,19 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FILE",
         help="build the designs from this kit (a kit.json), whose parts stay as they are",
+    )
+    parser.add_argument(
+        "--stock",
+        type=Path,
+        metavar="FILE",
+        help="build the designs from pieces that exist: a table (CSV or JSON) of kind, parameters "
+        "and how many there are; where they don't suffice, says which are missing",
+    )
+    parser.add_argument(
+        "--together",
+        action="store_true",
+        help="with --stock: all designs stand at the same time (default: they are built one after "
+        "the other from the same pieces)",
     )
     parser.add_argument(
         "--weights",
@@ -106,7 +120,10 @@ def run(args: argparse.Namespace) -> int:
 
     from ..errors import InputError
     from ..io.kits import load_kit
+    from ..io.stocks import load_stock
     from ..io.studies import load_study
+    from ..kit.parts import Kit
+    from ..kit.stock import Stock
     from ..report.environment import usable_cores
     from ..report.kit_run import optimize_and_report
     from ..search.objective import Weights
@@ -118,11 +135,23 @@ def run(args: argparse.Namespace) -> int:
             field="--parts",
             value=args.parts,
         )
-    kit = None if args.kit is None else load_kit(args.kit)
+    if args.stock is not None and (args.kit is not None or args.parts):
+        raise InputError(
+            "a stock says which parts there are: give it without --kit and --parts",
+            field="--stock",
+            value=args.stock,
+        )
+    if args.together and args.stock is None:
+        raise InputError("says how a stock is used: give it with --stock", field="--together")
+    kit: Kit | Stock | None = None
+    if args.kit is not None:
+        kit = load_kit(args.kit)
+    elif args.stock is not None:
+        kit = load_stock(args.stock, together=args.together)
     parts = {_singular(k): count for k, count in (args.parts or study.parts).items()}
     if not parts and kit is None:
         raise InputError(
-            "says nothing of the parts: --parts or --kit is required", source=args.folder
+            "says nothing of the parts: --parts, --kit or --stock is required", source=args.folder
         )
     Weights.of(args.weights or {})  # names that aren't terms are found before anything is read
     study = replace(

@@ -66,7 +66,13 @@ def _load(file: Path) -> ctypes.CDLL | None:
         ("solve_columns", integer, (*[pointer] * 3, count, *[pointer] * 3, count, *[pointer] * 4)),
         ("multiply_blocks", None, (count, *[pointer] * 3, count, count, *[pointer] * 2)),
         ("rasterise", None, (count, *[pointer] * 3, count, count, *[pointer] * 2)),
-        ("descend", count, (count, count, count, count, *[pointer] * 6, ctypes.c_double)),
+        (
+            "descend",
+            count,
+            (count, count, count, count, *[pointer] * 6, ctypes.c_double, count, pointer),
+        ),
+        ("served_by_parts", None, (*[count] * 6, *[pointer] * 9)),
+        ("most_in_boxes", None, (*[count] * 6, *[pointer] * 10)),
     ):
         function = getattr(found, name)
         function.restype, function.argtypes = result, arguments

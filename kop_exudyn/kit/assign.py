@@ -1,14 +1,13 @@
-"""Assign parts to elements: the nearest ones, or the best ones that a stock of parts has enough
-of."""
+"""Assign parts to elements: the nearest ones, or the best ones of which there are enough pieces."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import scipy.sparse as sp
+from scipy.optimize import linear_sum_assignment
 
-from ..errors import InputError, SimulationFailure
+from ..errors import InputError
 from .elements import KindElements, Labels, collect
 from .groups import ElementGroup
 from .parts import Assignment, Kit
@@ -23,28 +22,6 @@ def nearest(groups: Sequence[ElementGroup], q: np.ndarray, kit: Kit) -> Assignme
     return to_assignment(
         groups, len(q), elements, {name: e.nearest(kit[name]) for name, e in elements.items()}
     )
-
-
-def assign_with_stock(
-    groups: Sequence[ElementGroup], q: np.ndarray, kit: Kit, counts: Mapping[str, Sequence[int]]
-) -> Assignment:
-    """The assignment of least total squared distance that uses part i of each kind at most
-    counts[kind][i] times.
-
-    A transport problem a kind, solved as a mixed-integer program by HiGHS; an end element uses up a
-    whole part. Kinds without counts are not limited. Raises InputError when the stock is too small
-    or doesn't fit the kit.
-    """
-    elements = collect(groups, q)
-    labels = {}
-    for name, e in elements.items():
-        parts = kit[name]
-        labels[name] = (
-            _transport(e, parts, _stock(name, counts[name], len(parts), e.n))
-            if name in counts
-            else e.nearest(parts)
-        )
-    return to_assignment(groups, len(q), elements, labels)
 
 
 def to_assignment(
@@ -64,40 +41,43 @@ def to_assignment(
     return Assignment(tuple(groups), tuple(part), tuple(variant), n_q)
 
 
-def _stock(name: str, counts: Sequence[int], n_parts: int, n_elements: int) -> np.ndarray:
-    stock = np.asarray(counts)
-    if stock.shape != (n_parts,) or not np.issubdtype(stock.dtype, np.integer) or np.any(stock < 0):
-        raise InputError(
-            f"expected {n_parts} whole numbers, not negative", field=f"counts.{name}", value=counts
-        )
-    if stock.sum() < n_elements:
-        raise InputError(
-            f"the stock has {stock.sum()} parts for {n_elements} elements", field=f"counts.{name}"
-        )
-    return stock
+def element_owners(
+    groups: Sequence[ElementGroup], elements: KindElements, owner_of: np.ndarray
+) -> np.ndarray:
+    """(n,) the owner of each element, from those of the groups (n_groups,)."""
+    numbers = [number for block in elements.groups for number in block]
+    return np.repeat(owner_of[numbers], [len(groups[number].indices) for number in numbers])
 
 
-def _transport(elements: KindElements, parts: np.ndarray, stock: np.ndarray) -> Labels:
-    """min sum c_ij x_ij, sum_j x_ij = 1, sum_i x_ij <= stock_j, x binary. Its matrix is totally
-    unimodular."""
-    from scipy.optimize import LinearConstraint, milp
+def transport(
+    elements: KindElements,
+    parts: np.ndarray,
+    counts: np.ndarray,
+    owner: np.ndarray,
+    surcharge: np.ndarray | None = None,
+) -> Labels:
+    """Parts of least total squared distance, of which each owner's elements use part i at most
+    counts[i] times.
 
+    parts : (m, k_p); counts : (m,); owner : (n,) of each element
+    surcharge : (m,) added to the squared distances
+
+    An end element uses up a whole part. Raises InputError where there are fewer pieces than
+    elements of an owner.
+    """
     costs, variants = elements.costs(parts)
-    n, m = costs.shape
-    each_element = sp.kron(sp.eye_array(n), np.ones((1, m)), format="csr")
-    each_part = sp.kron(np.ones((1, n)), sp.eye_array(m), format="csr")
-    scale = max(costs.max(), np.finfo(float).tiny)
-    solution = milp(
-        costs.ravel() / scale,
-        integrality=np.ones(n * m),
-        bounds=(0, 1),
-        options={"mip_rel_gap": 0.0},
-        constraints=[LinearConstraint(each_element, 1, 1), LinearConstraint(each_part, 0, stock)],
-    )
-    if solution.x is None:
-        raise SimulationFailure(
-            solution.message, where=f"stock assignment of {elements.kind.name} parts"
-        )
-    part = solution.x.reshape(n, m).argmax(axis=1)
-    rows = np.arange(n)
+    priced = costs if surcharge is None else costs + surcharge
+    part = priced.argmin(axis=1)
+    for number in np.unique(owner):
+        own = np.flatnonzero(owner == number)
+        if np.all(np.bincount(part[own], minlength=len(parts)) <= counts):
+            continue  # the nearest ones suffice
+        if counts.sum() < len(own):
+            raise InputError(
+                f"the stock has {counts.sum()} {elements.kind.name} pieces for {len(own)} elements",
+                field=f"counts.{elements.kind.name}",
+            )
+        pieces = np.repeat(np.arange(len(parts)), np.minimum(counts, len(own)))
+        part[own] = pieces[linear_sum_assignment(priced[np.ix_(own, pieces)])[1]]
+    rows = np.arange(len(part))
     return Labels(part, variants[rows, part], costs[rows, part])

@@ -4,7 +4,7 @@ energy."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -71,6 +71,15 @@ class KindElements:
         """Where each block's elements stand among all."""
         ends = np.cumsum([len(block.values) for block in self.blocks]).tolist()
         return [slice(start, end) for start, end in zip([0, *ends], ends)]
+
+    def among(self, chosen: np.ndarray) -> KindElements:
+        """Some of the elements (n,) bool; they belong to no groups any more."""
+        blocks = [
+            replace(block, values=block.values[chosen[span]])
+            for block, span in zip(self.blocks, self.spans)
+        ]
+        filled = tuple(block for block in blocks if len(block.values))
+        return replace(self, blocks=filled, groups=((),) * len(filled))
 
     @property
     def numbers(self) -> np.ndarray | None:

@@ -1,17 +1,16 @@
 """Optimal clusters of numbers: k-means in one dimension, solved exactly by dynamic programming.
 
-In one dimension every optimal cluster is an interval of the sorted numbers, and the best ends of
-the last interval never move left as numbers are added (the cost satisfies the quadrangle
-inequality, also where centres are bounded). Divide and conquer then takes O(m n log n). Wang and
-Song, "Ckmeans.1d.dp: optimal k-means clustering in one dimension by dynamic programming" (The R
-Journal, 2011); Gronlund, Larsen, Mathiasen, Nielsen, Schneider and Song, "Fast exact k-means,
-k-medians and Bregman divergence clustering in 1D" (arXiv 1701.07204, 2017).
+In one dimension every optimal cluster is an interval of the sorted numbers, also where centres are
+bounded. The best last interval of the first j numbers is found among all, for one cluster after
+another: O(m n^2) for n distinct numbers. Wang and Song, "Ckmeans.1d.dp: optimal k-means clustering
+in one dimension by dynamic programming" (The R Journal, 2011).
 """
 
 from __future__ import annotations
 
-import numba as nb
 import numpy as np
+
+_AT_ONCE = 2_000_000  # numbers worked on at a time
 
 
 def optimal_centres(
@@ -39,42 +38,42 @@ def optimal_centres(
     return np.append(centres, np.repeat(centres[-1:], m - groups)), total
 
 
-@nb.njit(cache=True)
-def _cost(start, end, ones, first, second, lower, upper):
-    """Of the values from start to end (exclusive), about their best centre between the bounds."""
-    weight, moment = ones[end] - ones[start], first[end] - first[start]
-    centre = min(max(moment / weight, lower), upper)
-    about = second[end] - second[start] - centre * (2 * moment - centre * weight)
-    return max(about, 0.0)
-
-
-@nb.njit(cache=True)
-def _interval_ends(ones, first, second, lower, upper, m):
+def _interval_ends(
+    ones: np.ndarray,
+    first: np.ndarray,
+    second: np.ndarray,
+    lower: float,
+    upper: float,
+    m: int,
+) -> list[int]:
     """(m + 1,) where the optimal intervals of n values begin and end, from running sums of weights,
     of weighted values and of weighted squares (n + 1,)."""
     n = len(ones) - 1
-    best = np.empty(n + 1)  # cost of the first j values in the intervals so far
-    begins = np.zeros((m, n + 1), dtype=np.int64)
+    best = np.full(n + 1, np.inf)  # cost of the first j values in the intervals so far
     best[0] = 0.0
-    for j in range(1, n + 1):
-        best[j] = _cost(0, j, ones, first, second, lower, upper)
-    for group in range(1, m):
+    begins = np.zeros((m, n + 1), dtype=int)
+    for group in range(m):
         last, best = best, np.full(n + 1, np.inf)
-        # ranges of j with the range of begins that are optimal there
-        stack = [(group + 1, n, group, n - 1)]
-        while len(stack) > 0:
-            low, high, least, most = stack.pop()
-            if low > high:
-                continue
-            j = (low + high) // 2
-            for i in range(max(least, group), min(most, j - 1) + 1):
-                value = last[i] + _cost(i, j, ones, first, second, lower, upper)
-                if value < best[j]:
-                    best[j], begins[group, j] = value, i
-            stack.append((low, j - 1, least, begins[group, j]))
-            stack.append((j + 1, high, begins[group, j], most))
-    ends = np.empty(m + 1, dtype=np.int64)
-    ends[m] = n
+        for some in _pieces(n):
+            start = np.arange(some.stop)[:, None]
+            end = np.arange(some.start, some.stop)[None] + 1
+            weight = ones[end] - ones[start]
+            moment = first[end] - first[start]
+            valid = start < end
+            mean = moment / np.where(valid, weight, 1.0)
+            centre = np.clip(mean, lower, upper)
+            about = second[end] - second[start] - centre * (2 * moment - centre * weight)
+            total = last[start] + np.where(valid, np.maximum(about, 0.0), np.inf)
+            chosen = total.argmin(axis=0)
+            begins[group, end[0]] = chosen
+            best[end[0]] = total[chosen, np.arange(end.size)]
+    ends = [n]
     for group in range(m - 1, -1, -1):
-        ends[group] = begins[group, ends[group + 1]]
-    return ends
+        ends.append(int(begins[group, ends[-1]]))
+    return ends[::-1]
+
+
+def _pieces(n: int) -> list[slice]:
+    """Columns that are worked on at a time, of n."""
+    width = max(1, _AT_ONCE // max(n, 1))
+    return [slice(start, min(start + width, n)) for start in range(0, n, width)]

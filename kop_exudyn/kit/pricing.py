@@ -11,25 +11,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba as nb
 import numpy as np
 
 from .elements import KindElements
 from .kinds import Variants
+from .paying import PayingElements
 
 _GOOD = 0.9  # of the largest earnings known: centres of boxes that are worth a cut
-
-
-@dataclass(frozen=True)
-class _Weighted:
-    """Elements of equally many parameters in units of the kind's scale: values (n, k_e), how many
-    elements each row stands for (n,), and their variants as matrices V and reaches W."""
-
-    variants: Variants
-    values: np.ndarray
-    weights: np.ndarray
-    V: np.ndarray
-    W: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -43,7 +31,7 @@ class Pricing:
     penalty : (k_p,) of one part, on its squared parameters
     """
 
-    blocks: tuple[_Weighted, ...]
+    blocks: tuple[PayingElements, ...]
     displacement: float
     lower: np.ndarray
     upper: np.ndarray
@@ -71,7 +59,7 @@ class Pricing:
                 reach = block.variants.reach
                 V = np.ascontiguousarray(block.variants.matrices)
                 W = np.zeros_like(V) if reach is None else np.ascontiguousarray(reach)
-                blocks.append(_Weighted(block.variants, merged, weights, V, W))
+                blocks.append(PayingElements(block.variants, merged, weights, V, W))
             if sum(len(block.values) for block in blocks) <= most:
                 break
             grain = max(4 * grain, 1e-4)
@@ -95,10 +83,9 @@ class Pricing:
 
     def earnings(self, prices: np.ndarray, parts: np.ndarray) -> np.ndarray:
         """(N,) of the parts (N, k_p), when the rows pay the prices (n,)."""
-        parts = np.ascontiguousarray(parts)
         earned = -self.own_cost(parts)
         for block, own in zip(self.blocks, self._split(prices)):
-            _add_earned(parts, block.values, block.V, block.W, block.weights, own, earned)
+            block.add_served(parts, own, self.exact, earned)
         return earned
 
     def improved(
@@ -157,14 +144,10 @@ class Pricing:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Normal equations (N, k_p, k_p), (N, k_p) of the rows that each part serves at a profit,
         and its earnings (N,)."""
-        parts = np.ascontiguousarray(parts)
         normal = np.tile(np.diag(self.penalty), (len(parts), 1, 1))
         right, earned = np.zeros(parts.shape), -self.own_cost(parts)
         for block, own in zip(self.blocks, self._split(prices)):
-            _add_served(
-                parts, block.values, block.V, block.W, self.exact, block.weights, own,
-                normal, right, earned,
-            )  # fmt: skip
+            block.add_served(parts, own, self.exact, earned, normal, right)
         return normal, right, earned
 
     def _most_in_boxes(self, prices: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -172,10 +155,7 @@ class Pricing:
         alone = np.zeros(len(low))
         curvature, slope = np.zeros(low.shape) + self.penalty, np.zeros(low.shape)
         for block, own in zip(self.blocks, self._split(prices)):
-            _add_in_boxes(
-                low, high, block.values, block.V, block.W, self.exact, block.weights, own,
-                alone, curvature, slope,
-            )  # fmt: skip
+            block.add_in_boxes(low, high, own, self.exact, alone, curvature, slope)
         used = curvature > 0
         best = np.clip(np.where(used, slope / np.where(used, curvature, 1.0), low), low, high)
         return alone + np.sum((2 * slope - curvature * best) * best, axis=1)
@@ -208,7 +188,7 @@ def _symmetries(variants: Variants) -> list[np.ndarray]:
 
 
 def _hull(
-    blocks: list[_Weighted], lower: np.ndarray, upper: np.ndarray
+    blocks: list[PayingElements], lower: np.ndarray, upper: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Between which parameters of optimal parts lie: averages of what they realise, or reaches no
     longer than these differ."""
@@ -233,115 +213,3 @@ def _halved(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     left, right = high.copy(), low.copy()
     left[rows, edge] = right[rows, edge] = middle
     return np.concatenate([low, right]), np.concatenate([left, high])
-
-
-@nb.njit(cache=True)
-def _add_earned(parts, values, V, W, weights, prices, earned):
-    """Adds what each part earns with these elements."""
-    k_e, k_p = values.shape[1], parts.shape[1]
-    at, width = np.zeros((len(V), k_e)), np.zeros((len(V), k_e))
-    for i in range(len(parts)):
-        for v in range(len(V)):
-            for e in range(k_e):
-                at[v, e] = width[v, e] = 0.0
-                for k in range(k_p):
-                    at[v, e] += V[v, e, k] * parts[i, k]
-                    width[v, e] += W[v, e, k] * parts[i, k]
-        for j in range(len(values)):
-            least = prices[j]
-            for v in range(len(V)):
-                total = 0.0
-                for e in range(k_e):
-                    residual = values[j, e] - at[v, e]
-                    if residual > 0:
-                        residual = max(0.0, residual - width[v, e])
-                    total += residual * residual
-                least = min(least, total)
-            earned[i] += weights[j] * (prices[j] - least)
-
-
-@nb.njit(cache=True)
-def _add_served(parts, values, V, W, exact, weights, prices, normal, right, earned):
-    """See `Pricing._served`; adds to the last three."""
-    n, k_e = values.shape
-    k_p = parts.shape[1]
-    at, width = np.zeros((len(V), k_e)), np.zeros((len(V), k_e))
-    for i in range(len(parts)):
-        for v in range(len(V)):
-            for e in range(k_e):
-                at[v, e] = width[v, e] = 0.0
-                for k in range(k_p):
-                    at[v, e] += V[v, e, k] * parts[i, k]
-                    width[v, e] += W[v, e, k] * parts[i, k]
-        for j in range(n):
-            squared, which = np.inf, 0
-            for v in range(len(V)):
-                total = 0.0
-                for e in range(k_e):
-                    residual = values[j, e] - at[v, e]
-                    if residual > 0:
-                        residual = max(0.0, residual - width[v, e])
-                    total += residual * residual
-                if total < squared:
-                    squared, which = total, v
-            if squared >= prices[j]:
-                continue
-            earned[i] += weights[j] * (prices[j] - squared)
-            for e in range(k_e):
-                residual = values[j, e] - at[which, e]
-                beyond = residual > width[which, e]
-                if not exact and residual >= 0 and not beyond:
-                    continue
-                for k in range(k_p):
-                    a = V[which, e, k] + (W[which, e, k] if beyond else 0.0)
-                    if a == 0:
-                        continue
-                    right[i, k] += weights[j] * a * values[j, e]
-                    for o in range(k_p):
-                        b = V[which, e, o] + (W[which, e, o] if beyond else 0.0)
-                        normal[i, k, o] += weights[j] * a * b
-
-
-@nb.njit(cache=True)
-def _add_in_boxes(low, high, values, V, W, exact, weights, prices, alone, curvature, slope):
-    """Adds what the elements earn at most in boxes: those taken one by one to `alone`, those taken
-    together as alone + 2 slope.p - curvature.p^2."""
-    n, k_e = values.shape
-    k_p, n_v = low.shape[1], len(V)
-    first, last, longest = np.zeros((n_v, k_e)), np.zeros((n_v, k_e)), np.zeros((n_v, k_e))
-    for i in range(len(low)):
-        for v in range(n_v):
-            for e in range(k_e):
-                first[v, e] = last[v, e] = longest[v, e] = 0.0
-                for k in range(k_p):
-                    a = V[v, e, k]
-                    first[v, e] += a * (low[i, k] if a > 0 else high[i, k])
-                    last[v, e] += a * (high[i, k] if a > 0 else low[i, k])
-                    longest[v, e] += W[v, e, k] * high[i, k]
-        for j in range(n):
-            nearest, farthest, second, which = np.inf, 0.0, np.inf, 0
-            for v in range(n_v):
-                near, far = 0.0, 0.0
-                for e in range(k_e):
-                    below = first[v, e] - values[j, e]
-                    above = values[j, e] - last[v, e]
-                    d = max(0.0, below, above - longest[v, e])
-                    near += d * d
-                    d = max(abs(below), abs(above))
-                    far += d * d
-                if near < nearest:
-                    second, nearest, farthest, which = nearest, near, far, v
-                elif near < second:
-                    second = near
-            if nearest >= prices[j]:
-                continue
-            if not (exact and farthest <= second and farthest <= prices[j]):
-                alone[i] += weights[j] * (prices[j] - nearest)
-                continue
-            alone[i] += weights[j] * prices[j]
-            for e in range(k_e):
-                alone[i] -= weights[j] * values[j, e] ** 2
-                for k in range(k_p):
-                    a = V[which, e, k]
-                    curvature[i, k] += weights[j] * a * a
-                    slope[i, k] += weights[j] * a * values[j, e]

@@ -4,6 +4,7 @@ shows them."""
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from ..drawing.style import save_figure
 from ..files.files import make_folder
@@ -51,7 +52,7 @@ def _page(result: KitResult, figures: dict) -> Page:
     elements = sum(design.n_elements for design in result.designs)
     designs = "a design" if len(result.designs) == 1 else f"{len(result.designs)} designs"
     title = (
-        f"An existing kit for {designs}"
+        f"{'A stock' if 'stock' in result.settings else 'An existing kit'} for {designs}"
         if "kit" in result.settings
         else f"One kit of parts for {designs}"
     )
@@ -92,6 +93,8 @@ def _page(result: KitResult, figures: dict) -> Page:
         "Elements before and after the relaxed stage, and the final parts.",
         alt="Elements and parts in the space of their parameters",
     )
+    if "stock" in result.settings:
+        page.section("The stock", _how_used(result)).table(*_stock_rows(result))
     for kind, parts in result.kit.to_dict().items():
         several = isinstance(parts[0], list)
         unit = unit_of("angle" if part_kind(kind).angular else "length", result.units)
@@ -105,3 +108,25 @@ def _page(result: KitResult, figures: dict) -> Page:
         f"iterations in {result.wall_s:.0f} s.",
     )
     return page.details("Settings", result.settings).details("Versions and machine", environment())
+
+
+def _how_used(result: KitResult) -> str:
+    if result.settings["together"]:
+        return "All designs stand at the same time; pieces are left when all of them are built."
+    return "The designs are built one after the other, each from the whole stock."
+
+
+def _stock_rows(result: KitResult) -> tuple[list[str], list[list[Any]]]:
+    """Header and rows: every part of the stock, how many pieces there are, how many each design
+    uses, and what is left."""
+    used = result.pieces()
+    rows: list[list[Any]] = []
+    for kind, parts in result.kit.parts.items():
+        there = result.settings["stock"][kind]
+        for k, values in enumerate(parts):
+            own = [int(counts[kind][k]) for counts in used]
+            taken = sum(own) if result.settings["together"] else max(own)
+            size = ", ".join(f"{value:.6g}" for value in values)
+            rows.append([kind, k + 1, size, there[k], *own, there[k] - taken])
+    names = [design.name for design in result.designs]
+    return ["kind", "part", "parameters", "there", *names, "left"], rows

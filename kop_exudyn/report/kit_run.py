@@ -14,6 +14,7 @@ from tqdm.contrib.logging import logging_redirect_tqdm
 from ..io.checkpoint import Job
 from ..io.run_folder import RunFolder
 from ..kit.parts import Kit
+from ..kit.stock import Stock
 from ..search.result import KitResult
 from ..search.run import check_request, described_job, digest, optimize_kit
 from ..search.settings import JobSettings
@@ -27,7 +28,7 @@ def optimize_and_report(
     parts: Mapping[str, int] | None = None,
     *,
     out: str | Path,
-    kit: Kit | None = None,
+    kit: Kit | Stock | None = None,
     settings: JobSettings = JobSettings(),
     inputs: Sequence[str | Path] = (),
     resume: bool = False,

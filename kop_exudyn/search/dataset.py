@@ -95,6 +95,11 @@ class Dataset:
         ]
 
     @property
+    def group_designs(self) -> np.ndarray:
+        """(n_groups,) the place in this dataset of each group's design."""
+        return np.repeat(np.arange(len(self.designs)), [len(d.groups) for d in self.designs])
+
+    @property
     def parameters(self) -> np.ndarray:
         """(n_q,) the inputs' parameters."""
         return np.concatenate([d.parameters for d in self.designs])

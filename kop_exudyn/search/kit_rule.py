@@ -1,7 +1,7 @@
-"""Whether the parts are sought or given: the two ways in which the stages treat a kit.
+"""Whether the parts are sought or given: the ways in which the stages treat a kit.
 
 A sought kit follows the elements and is optimised; a given one (projection onto a kit that exists)
-stays as it is, and only the assignment changes.
+stays as it is, and only the assignment changes; of a stock there are no more pieces than it has.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from ..kit.cluster import cluster
 from ..kit.groups import ElementGroup
 from ..kit.parts import Assignment, Kit
 from ..kit.projection import Projection, ProjectionHessian, ProjectionMinimum
+from ..kit.stock import Numbers, Stock
 from ..sqp.problem import LiftedTerm
 from .settings import StageSettings
 
@@ -25,10 +26,14 @@ class KitRule(Protocol):
     """What the stages ask of a kit.
 
     parts_move : whether the parts are variables
+    stock : pieces of which the elements have to be made, None where these can be made
     """
 
     @property
     def parts_move(self) -> bool: ...
+
+    @property
+    def stock(self) -> Stock | None: ...
 
     @property
     def sizes(self) -> Mapping[str, int]:
@@ -63,6 +68,7 @@ class SoughtKit:
 
     sizes: Mapping[str, int]
     parts_move = True
+    stock = None
 
     def first(
         self,
@@ -102,6 +108,7 @@ class GivenKit:
 
     kit: Kit
     parts_move = False
+    stock: Stock | None = None
 
     @property
     def sizes(self) -> Mapping[str, int]:
@@ -114,7 +121,7 @@ class GivenKit:
         projection: Projection,
         settings: StageSettings,
     ) -> tuple[Kit, Assignment]:
-        return self.kit, projection.assign(q, self.kit).assignment
+        return self.kit, self.nearest(projection, q, self.kit).assignment
 
     def nearest(self, projection: Projection, q: np.ndarray, kit: Kit) -> ProjectionMinimum:
         return projection.assign(q, kit)
@@ -126,6 +133,26 @@ class GivenKit:
         return 0
 
 
-def rule_of(parts: Mapping[str, int] | Kit) -> KitRule:
-    """The rule for numbers of parts a kind, or for a kit."""
+@dataclass(frozen=True)
+class GivenStock(GivenKit):
+    """Parts that exist in limited numbers.
+
+    design_of : (n_groups,) the design that each group of elements belongs to
+    """
+
+    design_of: tuple[int, ...] = ()
+
+    def nearest(self, projection: Projection, q: np.ndarray, kit: Kit) -> ProjectionMinimum:
+        assert self.stock is not None
+        assignment = self.stock.assign(projection.groups, q, self.design_of)
+        return ProjectionMinimum(kit, assignment, projection.energy(q, kit, assignment))
+
+
+def rule_of(parts: Mapping[str, int] | Kit | Stock, design_of: Numbers) -> KitRule:
+    """The rule for numbers of parts a kind, for a kit, or for a stock.
+
+    design_of : (n_groups,) the design that each group of elements belongs to
+    """
+    if isinstance(parts, Stock):
+        return GivenStock(parts.kit, parts, tuple(int(n) for n in design_of))
     return GivenKit(parts) if isinstance(parts, Kit) else SoughtKit(dict(parts))

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from ..kit.kinds import Bounds
 from ..kit.parts import Assignment, Kit
 from ..kit.projection import Projection
+from ..kit.stock import Stock
 from ..sqp.constraints import LinearConstraints
 from ..sqp.problem import Derivatives, Point
 from .dataset import Dataset
@@ -113,6 +114,7 @@ class AssignedProblem:
     The assignment is fixed. M (n_q, n_p + k) is the assignment's for the parts, and puts y in its
     places.
     constraints : on the elements q = M p, as in `RelaxedProblem`
+    stock : pieces of which the elements may be made; default: of each part as many as needed
     """
 
     def __init__(
@@ -122,9 +124,10 @@ class AssignedProblem:
         assignment: Assignment,
         bounds: Bounds | None = None,
         constraints: LinearConstraints | None = None,
+        stock: Stock | None = None,
     ):
         self.dataset, self.kit, self.assignment = dataset, kit, assignment
-        self.part_bounds, self.of_elements = bounds, constraints
+        self.part_bounds, self.of_elements, self.stock = bounds, constraints, stock
         self._free, self._n_parts = dataset.free, len(kit.vector)
         places = sp.csr_matrix(
             (np.ones(len(self._free)), (self._free, np.arange(len(self._free)))),
@@ -143,6 +146,12 @@ class AssignedProblem:
             else LinearConstraints.none(self.n)
         )
         self.scale = self._scale()
+
+    def reassigned(self, assignment: Assignment) -> AssignedProblem:
+        """The same problem with other parts for the elements."""
+        return AssignedProblem(
+            self.dataset, self.kit, assignment, self.part_bounds, self.of_elements, self.stock
+        )
 
     def variables(self, q: np.ndarray) -> np.ndarray:
         """x of the problem's kit, with the parameters of no element as they are in q (n_q,)."""

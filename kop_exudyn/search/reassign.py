@@ -110,7 +110,9 @@ def reassign(
     frozen : designs whose elements keep their parts
     move_parts : `best_parts` (the default) moves the parts along, `keep_parts` leaves them
 
-    Elements of kinds that realise intervals keep their parts too. Returns None where no element
+    Where the problem has a stock, no more pieces are used than there are: elements take what is
+    left, and exchange what they have. Elements of kinds that realise intervals keep their parts
+    too. Returns None where no element
     gains by another part, or the constraints can't be met with what it would get.
     """
     move_parts = move_parts or best_parts
@@ -120,9 +122,7 @@ def reassign(
     for _ in range(_ROUNDS):
         changed = _sweep(current, vector, model, frozen)
         if changed is not None:
-            current = AssignedProblem(
-                problem.dataset, problem.kit, changed, problem.part_bounds, problem.of_elements
-            )
+            current = problem.reassigned(changed)
         moved = move_parts(current, vector, model)
         if moved is None:
             return None
@@ -150,6 +150,8 @@ def _sweep(
     parts, variants = list(problem.assignment.part), list(problem.assignment.variant)
     design_of = np.repeat(np.arange(len(q)), [len(d.groups) for d in dataset.designs])
     offsets = dataset.offsets
+    stock, plenty = problem.stock, np.iinfo(np.int64).max // 2
+    spare = None if stock is None else stock.spare(problem.assignment, design_of)
     changes = 0
     for number, (group, n) in enumerate(zip(problem.assignment.groups, design_of)):
         if n in frozen or len(group.indices) == 0:
@@ -160,7 +162,8 @@ def _sweep(
         candidates = np.einsum("vek,mk->mve", ways.matrices, kit[group.kind])
         n_ways = len(ways.names)
         choice = parts[number] * n_ways + variants[number]
-        changes += _descend(
+        left = np.full(len(candidates), plenty) if spare is None else spare[number]
+        state = (
             q[n],
             slopes[n],
             model.hessians[n],
@@ -168,7 +171,11 @@ def _sweep(
             candidates.reshape(-1, candidates.shape[2]),
             choice,
             model.rounding,
+            n_ways,
         )
+        changes += _descend(*state, left)
+        while spare is not None and _exchange(*state):
+            changes += 1 + _descend(*state, left)
         parts[number], variants[number] = choice // n_ways, choice % n_ways
     if not changes:
         return None
@@ -185,15 +192,19 @@ def _descend(
     candidates: np.ndarray,
     choice: np.ndarray,
     least: float,
+    n_ways: int,
+    left: np.ndarray,
 ) -> int:
-    """Coordinate descent over one group of elements until none gains; q, slope and choice are
+    """Coordinate descent over one group of elements until none gains; q, slope, choice and left are
     brought up to date. Returns how many changes there were.
 
     least : gain that counts; without one, two elements might swap forever
+    n_ways : candidates of one part, which follow each other
+    left : (m,) int64, pieces of each part that may still be taken
     """
     kernels = library()
     if kernels is None:
-        return _descend_numpy(q, slope, hessian, indices, candidates, choice, least)
+        return _descend_numpy(q, slope, hessian, indices, candidates, choice, least, n_ways, left)
     hessian, indices = np.ascontiguousarray(hessian), np.ascontiguousarray(indices, np.int64)
     candidates = np.ascontiguousarray(candidates, float)
     return kernels.descend(
@@ -207,24 +218,74 @@ def _descend(
         address(candidates),
         address(choice, np.int64),
         least,
+        n_ways,
+        address(left, np.int64),
     )
 
 
-def _descend_numpy(q, slope, hessian, indices, candidates, choice, least) -> int:
+def _descend_numpy(q, slope, hessian, indices, candidates, choice, least, n_ways, left) -> int:
     total, changed = 0, 1
     while changed:
         changed = 0
         for e, own in enumerate(indices):
             d = candidates - q[own]
             gains = d @ slope[own] + 0.5 * np.einsum("ci,ij,cj->c", d, hessian[np.ix_(own, own)], d)
+            mine = choice[e] // n_ways
+            gains[np.repeat((left <= 0) & (np.arange(len(left)) != mine), n_ways)] = np.inf
             which = int(np.argmin(gains))
             if gains[which] < -least and which != choice[e]:
                 slope += d[which] @ hessian[own]
                 q[own] = candidates[which]
+                left[mine] += 1
+                left[which // n_ways] -= 1
                 choice[e] = which
                 changed += 1
         total += changed
     return total
+
+
+def _exchange(
+    q: np.ndarray,
+    slope: np.ndarray,
+    hessian: np.ndarray,
+    indices: np.ndarray,
+    candidates: np.ndarray,
+    choice: np.ndarray,
+    least: float,
+    n_ways: int,
+) -> int:
+    """Let elements of one group exchange their parts (in any variants) with the partner by which
+    most is gained, each once; how many did. The rest as in `_descend`."""
+    changed = 0
+    ways = np.arange(n_ways)
+    for e, own in enumerate(indices):
+        mine, theirs = choice[e] // n_ways, choice // n_ways
+        others = np.flatnonzero(theirs != mine)
+        if not len(others):
+            continue
+        at = indices[others]
+        # what the element would be by each partner's part, and each partner by the element's
+        d = candidates[theirs[others, None] * n_ways + ways] - q[own]
+        d_other = candidates[mine * n_ways + ways][None] - q[at][:, None]
+        alone = d @ slope[own] + 0.5 * np.einsum("ova,ab,ovb->ov", d, hessian[np.ix_(own, own)], d)
+        blocks = hessian[at[:, :, None], at[:, None, :]]
+        partner = np.einsum("ova,oa->ov", d_other, slope[at])
+        partner += 0.5 * np.einsum("ova,oab,ovb->ov", d_other, blocks, d_other)
+        coupling = np.einsum("ova,aob,owb->ovw", d, hessian[own][:, at], d_other)
+        gains = alone[:, :, None] + partner[:, None, :] + coupling
+        best = int(gains.argmin())
+        if gains.flat[best] >= -least:
+            continue
+        o, v, w = np.unravel_index(best, gains.shape)
+        f = int(others[o])
+        for index, step in ((own, d[o, v]), (indices[f], d_other[o, w])):
+            slope += step @ hessian[index]
+            q[index] += step
+        choice[e], choice[f] = choice[f] // n_ways * n_ways + v, mine * n_ways + w
+        for number in (e, f):  # exactly, not but for rounding
+            q[indices[number]] = candidates[choice[number]]
+        changed += 1
+    return changed
 
 
 def best_parts(

@@ -66,6 +66,17 @@ class KitResult:
     def assignment(self) -> Assignment:
         return self.stages["assigned"].assignment
 
+    def pieces(self) -> list[dict[str, np.ndarray]]:
+        """By design: kind -> (m,) how many elements each part realises."""
+        found, first = [], 0
+        for design in self.designs:
+            rows = slice(first, first + len(design.groups))
+            whole = self.assignment
+            own = Assignment(whole.groups[rows], whole.part[rows], whole.variant[rows], whole.n_q)
+            found.append(own.pieces(self.kit))
+            first = rows.stop
+        return found
+
     def summary(self, stage: str, number: int) -> dict[str, Any]:
         """Fit, energy and confirmation of one design after a stage, or {"failed": why}."""
         outcome = self.stages[stage].designs[number]

@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..kit.cluster import cluster
 from ..kit.optimality import clustering_gaps
 from ..kit.parts import Kit
+from ..kit.stock import Missing, Stock
 from ..structures.base import Design
 from ..units import common_units
 from .assigned import assigned_stage, opened_stage
@@ -31,7 +32,7 @@ def optimize_kit(
     designs: Sequence[Design],
     parts: Mapping[str, int] | None = None,
     *,
-    kit: Kit | None = None,
+    kit: Kit | Stock | None = None,
     start: Sequence[Sequence[float]] | None = None,
     settings: JobSettings = JobSettings(),
     store: Store | None = None,
@@ -44,7 +45,8 @@ def optimize_kit(
     ----------
     designs : what is to be built
     parts : kind -> number of parts of the kit that is sought
-    kit : instead of `parts`: a kit whose parts stay as they are
+    kit : instead of `parts`: a kit whose parts stay as they are, or a stock of them, of which no
+        more pieces are used than there are
     start : by design, elements (nq,) that a neighbouring kit realises, in place of the direct
         projection, the baseline and the relaxed stage: the elements are clustered anew, and the
         assigned stage begins there
@@ -62,7 +64,7 @@ def optimize_kit(
     """
     begin = perf_counter()
     check_request(designs, parts, kit, settings)
-    sought: Mapping[str, int] | Kit = kit if kit is not None else dict(parts or {})
+    sought: Mapping[str, int] | Kit | Stock = kit if kit is not None else dict(parts or {})
     events: list[StageEvent] = []
 
     def observe(event: StageEvent) -> None:
@@ -116,7 +118,7 @@ def optimize_kit(
 def check_request(
     designs: Sequence[Design],
     parts: Mapping[str, int] | None,
-    kit: Kit | None,
+    kit: Kit | Stock | None,
     settings: JobSettings,
 ) -> None:
     """Raise InputError for what can't be met whatever the simulations say: too many parts or none,
@@ -126,7 +128,8 @@ def check_request(
         raise InputError("give either numbers of parts or a kit", field="parts")
     units = common_units({design.name: design.units for design in designs})
     if kit is not None:
-        common_units({"the kit": kit.units, "the designs": units}, "designs and kits")
+        given = kit.kit.units if isinstance(kit, Stock) else kit.units
+        common_units({"the kit": given, "the designs": units}, "designs and kits")
     offsets = np.cumsum([0, *(len(design.parameters) for design in designs)])
     constraints = settings.stages.constraints
     if constraints is not None and constraints.A.shape[1] != offsets[-1]:
@@ -134,20 +137,26 @@ def check_request(
             f"are on {constraints.A.shape[1]} parameters, the designs have {offsets[-1]}",
             field="constraints",
         )
-    if kit is not None:
+    if isinstance(kit, Kit):
         _check_kinds(designs, kit)
         return
     groups = [
         group.shifted(offset) for design, offset in zip(designs, offsets) for group in design.groups
     ]
     q = np.concatenate([design.parameters for design in designs])
+    if isinstance(kit, Stock):
+        design_of = np.repeat(np.arange(len(designs)), [len(d.groups) for d in designs])
+        missing = kit.missing(groups, q, design_of)
+        if missing:
+            raise InputError(_lacks(missing, designs, kit), field="stock")
+        return
     cluster(groups, q, dict(parts or {}), bounds=settings.stages.bounds, restarts=1)
 
 
 def described_job(
     designs: Sequence[Design],
     parts: Mapping[str, int] | None,
-    kit: Kit | None,
+    kit: Kit | Stock | None,
     settings: JobSettings,
 ) -> dict[str, Any]:
     """All that the result depends on, as plain data; the number of processes is not part of it."""
@@ -160,8 +169,13 @@ def described_job(
         numbers = (rows.indptr, rows.indices, rows.data, constraints.lower, constraints.upper)
         values["stages"]["constraints"] = {"rows": constraints.rows, "digest": digest(*numbers)}
     del values["jobs"]
-    sizes = dict(parts) if kit is None else kit.sizes  # type: ignore[arg-type]
-    given = {} if kit is None else {"kit": kit.to_dict()}
+    given: dict[str, Any] = {}
+    if isinstance(kit, Stock):
+        given = {"stock": kit.to_dict(), "together": kit.together}
+        kit = kit.kit
+    if kit is not None:
+        given |= {"kit": kit.to_dict()}
+    sizes = dict(parts or {}) if kit is None else kit.sizes
     return {"designs": [design.name for design in designs], "parts": sizes, **values, **given}
 
 
@@ -181,3 +195,21 @@ def _check_kinds(designs: Sequence[Design], kit: Kit) -> None:
                     field="kit",
                     value=", ".join(kit.sizes),
                 )
+
+
+def _lacks(missing: Sequence[Missing], designs: Sequence[Design], stock: Stock) -> str:
+    """What a stock lacks, in words: how many pieces of which kind, and of which parts best."""
+    found = []
+    for one in missing:
+        whose = "all designs together" if one.design is None else designs[one.design].name
+        text = f"{one.number} {one.kind} pieces are missing for {whose}"
+        if one.copies is not None:
+            parts = stock.kit[one.kind]
+            best = ", ".join(
+                f"{count} of ({', '.join(f'{value:.6g}' for value in parts[k])})"
+                for k, count in enumerate(one.copies)
+                if count
+            )
+            text += f" (best of the parts that are there: {best})"
+        found.append(text)
+    return "doesn't suffice: " + "; ".join(found)

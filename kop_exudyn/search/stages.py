@@ -15,6 +15,7 @@ from ..errors import InputError, SimulationFailure
 from ..kit.cluster import cluster
 from ..kit.parts import Assignment, Kit
 from ..kit.projection import Projection
+from ..kit.stock import Stock
 from ..sqp.constraints import check_feasible
 from ..sqp.history import SQPState
 from ..sqp.problem import Point
@@ -53,13 +54,13 @@ Observer = Callable[[StageEvent], None]
 class Stages:
     """Runs the stages for one dataset; interrupted SQPs go on from the store's checkpoints.
 
-    parts : kind -> number of parts of a kit that is sought, or a kit that is given
+    parts : kind -> number of parts of a kit that is sought, or a kit or a stock that is given
     """
 
     def __init__(
         self,
         dataset: Dataset,
-        parts: Mapping[str, int] | Kit,
+        parts: Mapping[str, int] | Kit | Stock,
         settings: StageSettings = StageSettings(),
         store: Store | None = None,
         observer: Observer | None = None,
@@ -68,7 +69,8 @@ class Stages:
         self.schedule = settings.schedule or tuple(
             k * (weights.fit or weights.energy) for k in (0.1, 1.0, 10.0, 100.0)
         )
-        self.dataset, self.rule, self.settings = dataset, rule_of(parts), settings
+        self.dataset, self.settings = dataset, settings
+        self.rule = rule_of(parts, dataset.group_designs)
         self.store, self.observer = store or NoStore(), observer or (lambda event: None)
         self.q0 = dataset.parameters
         self.projection = Projection.of_inputs(dataset.groups, self.q0, bounds=settings.bounds)
@@ -169,6 +171,7 @@ class Stages:
             restrict(start.assignment, self.dataset, members),
             self.settings.bounds,
             constraints,
+            self.rule.stock,
         )
 
     def built_from(

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from kop_exudyn.kit.parts import Assignment, Kit
 from kop_exudyn.search.result import KitResult
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
@@ -41,28 +40,13 @@ def find_kit(
     return _plain(optimize_kit(designs, parts, start=start, settings=settings))
 
 
-def pieces_by_design(
-    designs: Sequence[Design], kit: Kit, assignment: Assignment
-) -> list[dict[str, list[int]]]:
-    """By design: kind -> (m,) how many elements each part realises."""
-    found, first = [], 0
-    for design in designs:
-        rows = slice(first, first + len(design.groups))
-        own = Assignment(
-            assignment.groups[rows], assignment.part[rows], assignment.variant[rows], assignment.n_q
-        )
-        found.append({kind: counts.tolist() for kind, counts in own.pieces(kit).items()})
-        first = rows.stop
-    return found
-
-
 def _plain(result: KitResult) -> dict[str, Any]:
     offsets = np.cumsum([len(design.parameters) for design in result.designs])[:-1]
     realised = np.split(result.assignment.matrix(result.kit) @ result.kit.vector, offsets)
     return {
         "kit": result.kit.to_dict(),
         "assignment": result.assignment.to_dict(),
-        "pieces": pieces_by_design(result.designs, result.kit, result.assignment),
+        "pieces": result.pieces(),
         "realised": realised,
         "designs": [
             {"name": design.name, "elements": design.n_elements, **result.summary("assigned", n)}

@@ -15,10 +15,12 @@ from kop_exudyn.io.results import load_result, load_states
 from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.kit.groups import ElementGroup
 from kop_exudyn.kit.parts import Kit
+from kop_exudyn.kit.stock import Stock
 from kop_exudyn.report.kit_drawings import drawn_designs, histories, part_spaces
 from kop_exudyn.report.kit_run import optimize_and_report
 from kop_exudyn.rods.rotations import rotation_z
 from kop_exudyn.scene.builder import SceneBuilder
+from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.structures.base import Design, Role, Target
 
@@ -231,6 +233,66 @@ def test_designs_from_a_kit_that_exists(finished, tmp_path):
     ):
         optimize_and_report(zigzags()[:1], out=tmp_path / "no", kit=Kit({"linear": kit["linear"]}))
     assert not (tmp_path / "no").exists()
+
+
+@pytest.fixture(scope="module")
+def another_kit():
+    """A kit for other designs of the class, and how many pieces of each part it takes to build
+    these one after the other."""
+    generator = np.random.default_rng(8)
+    others = [
+        Zigzag(f"other {k}", 0.3 + 0.1 * generator.random((9, 2)), 0.6 * generator.random(8) - 0.3)
+        for k in range(2)
+    ]
+    result = optimize_kit(others, {"linear": 4, "angular": 3}, settings=SETTINGS)
+    return result.kit, {
+        kind: np.max([counts[kind] for counts in result.pieces()], axis=0)
+        for kind in result.kit.parts
+    }
+
+
+def test_a_stock_of_60_percent_of_another_kits_pieces(another_kit, tmp_path):
+    kit, needed = another_kit
+    counts = {kind: np.floor(0.6 * n).astype(int) for kind, n in needed.items()}
+    stock = Stock(kit, counts)
+    out = tmp_path / "out"
+    result = optimize_and_report(zigzags(), kit=stock, out=out, settings=SETTINGS)
+    np.testing.assert_array_equal(result.kit.vector, kit.vector)
+    for n, used in enumerate(result.pieces()):
+        assert all(np.all(used[kind] <= counts[kind]) for kind in counts)
+        assert used["linear"].sum() == 4 and used["angular"].sum() == 3
+        assert result.stages["assigned"].designs[n].confirmations
+    # scarce pieces cost something, and moving the designs to them gains something
+    free = optimize_kit(zigzags(), kit=kit, settings=SETTINGS)
+    assert any(np.any(u[k] > counts[k]) for u in free.pieces() for k in counts)
+    assert free.stages["assigned"].value < result.stages["assigned"].value
+    assert result.stages["assigned"].value < result.stages["direct"].value
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert "<h1>A stock for 2 designs</h1>" in page and "one after the other" in page
+    data = load_result(out / "result.json")
+    assert data["settings"]["stock"] == stock.to_dict()
+
+
+def test_a_stock_that_cannot_suffice(another_kit, tmp_path):
+    kit, _ = another_kit
+    counts = {"linear": np.array([1, 1, 0, 0]), "angular": np.array([2, 0, 3])}
+    with pytest.raises(InputError, match="2 linear pieces are missing for zigzag 0") as caught:
+        optimize_and_report(zigzags(), kit=Stock(kit, counts), out=tmp_path / "no")
+    assert "best of the parts that are there: " in str(caught.value)
+    assert not (tmp_path / "no").exists()
+    together = Stock(kit, counts, together=True)
+    with pytest.raises(InputError, match="1 angular pieces .* together.*; 6 linear pieces"):
+        optimize_kit(zigzags(), kit=together, settings=SETTINGS)
+
+
+def test_designs_that_stand_together_share_the_stock(another_kit):
+    kit, _ = another_kit
+    counts = {"linear": np.array([2, 2, 2, 2]), "angular": np.array([2, 2, 2])}
+    stock = Stock(kit, counts, together=True)
+    result = optimize_kit(zigzags(), kit=stock, settings=SETTINGS)
+    for kind, there in counts.items():
+        np.testing.assert_array_equal(sum(used[kind] for used in result.pieces()), there)
+    assert result.stages["assigned"].value < result.stages["direct"].value
 
 
 def test_another_job_is_not_resumed(finished):

@@ -1,13 +1,17 @@
 /* Coordinate descent on a quadratic function whose variables take values of a list. */
 #include <stdint.h>
 
-/* Give each of `elements` groups of `width` variables the candidate that lowers slope.d + d.H d / 2
+/* n_ways candidates that follow each other are those of one part, of which `left` more pieces may be
+   taken; an element that gets another part gives its own back.
+
+   Give each of `elements` groups of `width` variables the candidate that lowers slope.d + d.H d / 2
    most, one after the other, until none gains more than `least` any further; q (n), slope (n) and
    choice (elements) are brought up to date. indices (elements, width), candidates (n_candidates,
    width), hessian (n, n). Returns how many changes there were. */
 int64_t descend(int64_t elements, int64_t width, int64_t n_candidates, int64_t n, double *q,
                 double *slope, const double *hessian, const int64_t *indices,
-                const double *candidates, int64_t *choice, double least)
+                const double *candidates, int64_t *choice, double least,
+                int64_t n_ways, int64_t *left)
 {
     int64_t total = 0, changed = 1;
     while (changed) {
@@ -16,7 +20,10 @@ int64_t descend(int64_t elements, int64_t width, int64_t n_candidates, int64_t n
             const int64_t *at = indices + e * width;
             int64_t which = choice[e];
             double best = -least;
+            int64_t own = which / n_ways;
             for (int64_t c = 0; c < n_candidates; c++) {
+                if (c / n_ways != own && left[c / n_ways] <= 0)
+                    continue;
                 const double *to = candidates + c * width;
                 double gain = 0.0;
                 for (int64_t i = 0; i < width; i++) {
@@ -36,6 +43,8 @@ int64_t descend(int64_t elements, int64_t width, int64_t n_candidates, int64_t n
                     slope[j] += hessian[at[i] * n + j] * d;
                 q[at[i]] = candidates[which * width + i];
             }
+            left[own]++;
+            left[which / n_ways]--;
             choice[e] = which;
             changed++;
         }
