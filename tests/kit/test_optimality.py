@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from kop_exudyn.kit import paying
 from kop_exudyn.kit.cluster import cluster
 from kop_exudyn.kit.dual_bound import lower_bound
 from kop_exudyn.kit.elements import collect
@@ -48,6 +49,28 @@ def test_no_part_earns_more_than_the_bound(kind, seed):
     squared = pricing.squared(best[:1])[:, 0]
     by_hand = pricing.weights @ np.maximum(prices - squared, 0) - pricing.own_cost(best[:1])[0]
     assert earned[0] == pytest.approx(by_hand, rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["linear", "slit", "cell", "angular"])
+def test_compiled_or_not_is_the_same(kind, monkeypatch):
+    groups, q = problem(kind, 20, 7)
+    elements = collect(groups, q)[kind]
+    pricing = Pricing.of(elements, 3, elements.kind.bounds(None))
+    rng = np.random.default_rng(7)
+    prices = rng.uniform(0.0, 0.3, len(pricing.weights)) ** 2
+    parts = rng.uniform(pricing.lower, pricing.upper, (40, len(pricing.lower)))
+
+    def all_of_it():
+        return (
+            pricing.earnings(prices, parts),
+            *pricing.improved(prices, parts, 2),
+            *pricing.most_earned(prices, 0.0, 1e-2, most=300),
+        )
+
+    first = all_of_it()
+    monkeypatch.setattr(paying, "library", lambda: None)
+    for one, other in zip(first, all_of_it()):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
 
 
 @settings(deadline=None, max_examples=6)

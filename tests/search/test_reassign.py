@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 
 from kop_exudyn.kit.kinds import part_kind
+from kop_exudyn.kit.stock import Stock
 from kop_exudyn.search import assigned as rounds
+from kop_exudyn.search import reassign as reassigning
 from kop_exudyn.search.assigned import assigned_stage, opened_stage
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.objective import Weights
 from kop_exudyn.search.pool import DesignPool
+from kop_exudyn.search.problems import AssignedProblem
 from kop_exudyn.search.reassign import LocalModel, keep_parts, reassign
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
@@ -85,6 +88,40 @@ def test_model_is_the_second_order_expansion(stages, direct, derivatives):
         np.testing.assert_allclose(
             slope, d.gradient + d.hessian @ s, rtol=1e-10, atol=1e-12 * abs(slope).max()
         )
+
+
+def test_a_stock_is_kept_to_and_used(stages, direct, derivatives, monkeypatch):
+    """With few pieces the model still falls, by exchanges and by what is left; compiled or not."""
+    model = model_at(stages, derivatives, 1e-4)
+    pieces = direct.assignment.pieces(direct.kit)
+    counts = {kind: own + (np.arange(len(own)) == 0) for kind, own in pieces.items()}
+    for together in (False, True):
+        # each design what it has, or both together what they have: one piece more of the first part
+        stock = Stock(direct.kit, counts, together)
+        problem = AssignedProblem(stages.dataset, direct.kit, direct.assignment, stock=stock)
+        found = reassign(problem, model, move_parts=keep_parts)
+        assert found.changes > 0 and found.predicted.sum() < 0
+        for kind, used in found.assignment.pieces(found.kit).items():
+            assert np.all(used <= counts[kind]) or not together
+        monkeypatch.setattr(reassigning, "library", lambda: None)
+        again = reassign(problem, model, move_parts=keep_parts)
+        assert again.assignment.changes(found.assignment) == 0
+        monkeypatch.undo()
+    free = reassign(stages.assigned_problem(direct, range(2)), model, move_parts=keep_parts)
+    assert free.predicted.sum() <= found.predicted.sum()
+
+
+def test_exchanges_alone_leave_every_design_its_pieces(stages, direct, derivatives):
+    model = model_at(stages, derivatives, 1e-4)
+    stock = Stock(direct.kit, direct.assignment.pieces(direct.kit), True)
+    problem = AssignedProblem(stages.dataset, direct.kit, direct.assignment, stock=stock)
+    found = reassign(problem, model, move_parts=keep_parts)
+    assert found.changes > 0 and found.predicted.sum() < 0
+    for one, other in zip(found.assignment.part, direct.assignment.part):
+        assert sorted(one) == sorted(other)
+    q = found.assignment.matrix(found.kit) @ found.kit.vector
+    reached = model.values(stages.dataset.split(q))
+    np.testing.assert_allclose(reached, found.predicted, rtol=1e-9)
 
 
 def test_no_element_gains_by_another_part(stages, direct, derivatives):
