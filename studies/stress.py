@@ -28,7 +28,7 @@ from tqdm import tqdm
 
 from kop_exudyn.compiled.library import library
 from kop_exudyn.drawing.style import PALETTE, style
-from kop_exudyn.equilibrium.newton import Start
+from kop_exudyn.equilibrium.equilibria import Start
 from kop_exudyn.report.environment import peak_memory_mb
 from kop_exudyn.rods.rotations import exp_so3
 from kop_exudyn.search.run import optimize_kit

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
+from ..equilibrium.equilibria import Equilibrium
 from ..equilibrium.exudyn_model import Confirmation, ExudynModel
-from ..equilibrium.newton import Equilibrium, refine, solve
+from ..equilibrium.newton import refine, solve
 from ..equilibrium.system import System
 from ..errors import InputError, SimulationFailure
 from ..scene.loads import DeadForces, Scaled, with_self_weight

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from ..compiled.library import library
+from ..equilibrium.equilibria import Equilibrium
 from ..equilibrium.exudyn_model import Confirmation, ExudynModel
-from ..equilibrium.newton import Equilibrium, refine
+from ..equilibrium.newton import refine
 from ..errors import SimulationFailure
 from ..structures.base import Design
 from ..structures.deviation import fit_summary

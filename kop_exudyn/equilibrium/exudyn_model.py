@@ -20,8 +20,8 @@ from ..errors import SimulationFailure
 from ..rods.rotations import axes_along_z, exp_so3, log_so3
 from ..scene.scene import Scene
 from ..scene.state import State
+from .equilibria import Equilibrium
 from .exudyn_layout import Carrier, layout_of
-from .newton import Equilibrium
 
 _TESTED = (1, 13, 6)
 

@@ -23,7 +23,9 @@ from ..errors import SimulationFailure
 from ..scene.assembly import ENERGY
 from ..scene.state import State
 from .direction import border_of, bordered_solve, factorise_convex, is_convex, shift_unit
+from .equilibria import Equilibrium, Start
 from .softened import softened
+from .stability import softest_mode
 from .system import Energy, System
 
 log = logging.getLogger(__name__)
@@ -65,68 +67,6 @@ class NewtonOptions:
     escape_rotation: float = 0.05
     soften: bool = True
     side: np.ndarray | None = None
-
-
-@dataclass(frozen=True)
-class Start:
-    """Where a solve starts.
-
-    state : poses and angles
-    torque : the actuation's multiplier
-    stress : (E, 6) generalised stresses for the first geometric stiffness, default none: after a
-        jump in lengths the start's own stresses are spurious compressions that would make the
-        stiffness indefinite
-    """
-
-    state: State
-    torque: float = 0.0
-    stress: np.ndarray | None = None
-
-
-@dataclass(frozen=True)
-class Equilibrium:
-    """A stable equilibrium of a scene.
-
-    state : poses and angles
-    q : (n_parameters,) parameters that it belongs to
-    opening : prescribed mean actuated angle, or None
-    torque : the actuation's multiplier, energy / rad (0 without actuation): the torque on every
-        actuated hinge is torque / number of actuated hinges
-    stress : (E, 6) generalised stresses (N, Q_y, Q_z, M_t, M_y, M_z) in the elements
-    elastic_energy, potential : energies
-    iterations : Newton iterations of the solve, all phases
-    residual : largest residual force, relative to the largest internal force
-    escapes : saddles left on the way
-    wall_s : seconds
-    """
-
-    state: State
-    q: np.ndarray
-    opening: float | None
-    torque: float
-    stress: np.ndarray
-    elastic_energy: float
-    potential: float
-    iterations: int
-    residual: float
-    escapes: int
-    wall_s: float
-    stable: bool = True
-
-    @property
-    def start(self) -> Start:
-        """This equilibrium as the start of another solve."""
-        return Start(self.state, self.torque, self.stress)
-
-    def after(self, *earlier: Equilibrium) -> Equilibrium:
-        """The same equilibrium, with the iterations and seconds of the solves that led to it
-        added."""
-        return replace(
-            self,
-            iterations=self.iterations + sum(eq.iterations for eq in earlier),
-            escapes=self.escapes + sum(eq.escapes for eq in earlier),
-            wall_s=self.wall_s + sum(eq.wall_s for eq in earlier),
-        )
 
 
 def solve(
@@ -398,8 +338,6 @@ class _Run:
 
     def _leave_saddle(self, energy: Energy) -> None:
         """Move downhill along the softest mode of an unstable equilibrium."""
-        from .stability import softest_mode
-
         self.escapes += 1
         if self.escapes > self.options.escapes:
             raise SimulationFailure(f"still unstable after leaving {self.escapes - 1} saddles")

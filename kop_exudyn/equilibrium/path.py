@@ -24,7 +24,8 @@ from ..scene.loads import HingeTorques, Scaled
 from ..scene.scene import Scene
 from ..scene.state import State
 from .direction import Border, is_convex
-from .newton import Equilibrium, solve
+from .equilibria import Equilibrium
+from .newton import solve
 from .system import System
 
 _GROWTH, _EASY, _HARD = 1.5, 5, 8  # iterations after which steps grow, and after which they shrink

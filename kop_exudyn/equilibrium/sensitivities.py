@@ -17,7 +17,7 @@ from ..scene.scene import Scene
 from ..scene.state import State
 from .block_solve import Solutions
 from .direction import Border, border_of, bordered_solve
-from .newton import Equilibrium, Start
+from .equilibria import Equilibrium, Start
 from .system import System
 
 # Relative residual of the linear solves beyond which derivatives are worthless.

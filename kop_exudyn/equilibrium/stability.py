@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from .direction import bordered_solve, factorise_convex
+from .equilibria import Equilibrium
 from .system import System
-
-if TYPE_CHECKING:
-    from .newton import Equilibrium
 
 
 @dataclass(frozen=True)

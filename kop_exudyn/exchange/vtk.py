@@ -9,7 +9,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from ..equilibrium.newton import Equilibrium
+from ..equilibrium.equilibria import Equilibrium
 from ..files.files import write_text
 from ..scene.scene import Scene
 from ..structures.strength import Strength

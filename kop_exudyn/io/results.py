@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..equilibrium.newton import Equilibrium
+from ..equilibrium.equilibria import Equilibrium
 from ..errors import InputError
 from ..files.arrays import load_arrays, save_arrays
 from ..files.documents import check_envelope, check_schema

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..equilibrium.newton import Equilibrium, Start, solve
+from ..equilibrium.equilibria import Equilibrium, Start
+from ..equilibrium.newton import solve
 from ..errors import InputError, SimulationFailure
 from ..kit.optimality import ClusteringGap
 from ..kit.parts import Assignment, Kit

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..equilibrium.newton import Equilibrium
+from ..equilibrium.equilibria import Equilibrium
 from ..errors import SimulationFailure
 from ..kit.groups import ElementGroup
 from ..kit.kinds import part_kind

@@ -11,7 +11,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..drawing.colours import kit_colours
-from ..equilibrium.newton import Equilibrium, solve
+from ..equilibrium.equilibria import Equilibrium
+from ..equilibrium.newton import solve
 from ..errors import SimulationFailure
 from ..fabrication.pieces import DesignPieces, PartsList, parts_list_of
 from ..fabrication.placement import PlacedPieces

@@ -9,7 +9,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 
-from ..equilibrium.newton import Equilibrium
+from ..equilibrium.equilibria import Equilibrium
 from ..errors import InputError, SimulationFailure
 from ..kit.groups import ElementGroup
 from ..kit.kinds import Bounds, part_kind

@@ -16,8 +16,9 @@ from time import perf_counter
 
 import numpy as np
 
+from ..equilibrium.equilibria import Equilibrium, Start
 from ..equilibrium.exudyn_model import Confirmation, ExudynModel
-from ..equilibrium.newton import Equilibrium, NewtonOptions, Start, refine, solve
+from ..equilibrium.newton import NewtonOptions, refine, solve
 from ..equilibrium.sensitivities import Sensitivities
 from ..errors import InputError, SimulationFailure
 from ..structures.base import Design

@@ -23,7 +23,7 @@ from ..units import Units, units_from_dict
 from .loads import LoadCase, load_case_from_dict
 
 if TYPE_CHECKING:
-    from ..equilibrium.newton import Equilibrium
+    from ..equilibrium.equilibria import Equilibrium
     from ..equilibrium.system import System
     from ..scene.scene import Scene
     from ..scene.state import State

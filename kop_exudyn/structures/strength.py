@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from ..equilibrium.newton import Equilibrium
+from ..equilibrium.equilibria import Equilibrium
 from ..rods.sections import Material, Section
 from ..scene.scene import Scene
 from .base import Design

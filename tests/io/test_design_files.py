@@ -93,7 +93,11 @@ def test_variations_are_valid(c_shell_data, change):
             'section.type = \'tube\': must be one of "rectangle", "circle", "general"',
         ),
         (["section", "type"], ..., "section.type: is missing"),
-        (["section", "radius"], 1, "section.radius: unknown field (known: half_lap, height, joint_hole, type, width)"),
+        (
+            ["section", "radius"],
+            1,
+            "section.radius: unknown field (known: half_lap, height, joint_hole, type, width)",
+        ),
         (["section", "height"], ..., "section.height: is missing"),
         (["section", "width"], 0, "section.width = 0: must be positive"),
         (["section"], [1], "section = [1]: must be an object"),

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from kop_exudyn.equilibrium.newton import Equilibrium
+from kop_exudyn.equilibrium.equilibria import Equilibrium
 from kop_exudyn.errors import InputError
 from kop_exudyn.files.arrays import load_arrays
 from kop_exudyn.io.results import load_result, load_states, save_result, save_states

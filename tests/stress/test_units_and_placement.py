@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from kop_exudyn.equilibrium.equilibria import Start
 from kop_exudyn.equilibrium.exudyn_model import ExudynModel
-from kop_exudyn.equilibrium.newton import Start
 from kop_exudyn.rods.rotations import exp_so3
 from lib.stress.random_scenes import random_case
 from lib.stress.trial import STABLE, run_case

@@ -9,7 +9,7 @@ from typing import ClassVar, TypeVar
 
 import numpy as np
 
-from ...equilibrium.newton import Equilibrium
+from ...equilibrium.equilibria import Equilibrium
 from ...equilibrium.sensitivities import Sensitivities
 from ...errors import InputError
 from ...plugins import Registry

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...equilibrium.newton import Equilibrium
+from ...equilibrium.equilibria import Equilibrium
 from ...equilibrium.sensitivities import Sensitivities
 from ...structures.base import Role
 from ...structures.fitting import FitResult

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...equilibrium.newton import Equilibrium
+from ...equilibrium.equilibria import Equilibrium
 from ...equilibrium.sensitivities import Sensitivities
 from ...errors import InputError
 from ...scene.scene import Scene

@@ -22,7 +22,8 @@ import numpy as np
 from scipy.interpolate import CloughTocher2DInterpolator
 from scipy.spatial import Delaunay
 
-from ...equilibrium.newton import Equilibrium, NewtonOptions, Start, solve
+from ...equilibrium.equilibria import Equilibrium, Start
+from ...equilibrium.newton import NewtonOptions, solve
 from ...equilibrium.system import System
 from ...errors import InputError, SimulationFailure
 from ...geometry.linkage import refuse_loose_parts

@@ -24,7 +24,7 @@ from .grid_network import network_on
 from .lamellas import straighten_on
 
 if TYPE_CHECKING:
-    from ...equilibrium.newton import Equilibrium
+    from ...equilibrium.equilibria import Equilibrium
     from ...scene.scene import Scene
     from .scene import GridScene
 

@@ -22,7 +22,7 @@ from .pins import Pins, pins_from_dict
 from .release import release_mesh
 
 if TYPE_CHECKING:
-    from ...equilibrium.newton import Equilibrium
+    from ...equilibrium.equilibria import Equilibrium
     from ...scene.attraction import Attraction
     from ...scene.scene import Scene
     from ...scene.state import State

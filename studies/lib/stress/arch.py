@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from kop_exudyn.equilibrium.newton import Equilibrium, solve
+from kop_exudyn.equilibrium.equilibria import Equilibrium
+from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.errors import InputError
 from kop_exudyn.kit.groups import ElementGroup
 from kop_exudyn.rods.rotations import rotation_z

@@ -8,8 +8,9 @@ from time import perf_counter
 import numpy as np
 
 from kop_exudyn.equilibrium.direction import border_of, is_convex
+from kop_exudyn.equilibrium.equilibria import Equilibrium, Start
 from kop_exudyn.equilibrium.exudyn_model import ExudynModel
-from kop_exudyn.equilibrium.newton import Equilibrium, NewtonOptions, Start, refine, solve
+from kop_exudyn.equilibrium.newton import NewtonOptions, refine, solve
 from kop_exudyn.equilibrium.stability import softest_mode
 from kop_exudyn.equilibrium.system import System
 from kop_exudyn.errors import SimulationFailure
