@@ -2,13 +2,21 @@
 mean span.
 
 A conformal map keeps the grid's right angles, so each image is a net that can open like a scissor
-grid, with spans and curvatures of its own. Run it from anywhere: python models/conformals/make.py
+grid, with spans and curvatures of its own. Run it from anywhere:
+
+    python models/conformals/make.py            # write the files
+    python models/conformals/make.py --measure  # and say what share of the elastic limit each uses
+
+The section decides what can be built. Stress grows with the thickness. Breadth over thickness
+decides which shape the nets take: with much more than 6 the first modes out of the plane of `sinh`
+and `tanh` lie so close together that the size of the opening steps chooses between them.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +25,8 @@ JOINTS = 9  # a side
 POINTS_PER_SPAN = 4
 SPAN = 0.2  # mean distance of neighbouring joints, m
 DIGITS = 9
+MATERIAL = {"young": 2.1e9, "poisson": 0.35, "density": 900.0, "elastic_limit": 4.0e7}
+SECTION = {"type": "rectangle", "width": 0.012, "height": 0.002, "joint_hole": 0.003}
 
 Map = Callable[[np.ndarray], np.ndarray]
 # Each map on the square [-1, 1]^2, where none of them has a singular or critical point; and the
@@ -26,7 +36,7 @@ MAPS: dict[str, tuple[Map, float]] = {
     "sinh": (lambda z: np.sinh(0.64 * z), 0.75),
     "tanh": (lambda z: np.tanh(0.56 * z), 0.80),
     "exp": (lambda z: np.exp(0.48 * z), 0.70),
-    "cubic": (lambda z: z + 0.077 * z**3, 0.50),
+    "cubic": (lambda z: z + 0.077 * z**3, 0.60),
     "sine": (lambda z: np.sin(0.72 * z), 0.50),
     "moebius": (lambda z: z / (1 - 0.24 * z), 0.65),
     "log": (lambda z: np.log(z + 2.75), 0.75),
@@ -54,8 +64,8 @@ def design(name: str, image: Map, opening: float) -> dict:
         "class": "c_shell",
         "name": name,
         "units": {"length": "m", "force": "N"},
-        "material": {"young": 2.1e9, "poisson": 0.35, "density": 900.0, "elastic_limit": 4.0e7},
-        "section": {"type": "rectangle", "width": 0.03, "height": 0.004},
+        "material": MATERIAL,
+        "section": SECTION,
         "curves": curves,
         "crossings": "find",
         "free_ends": False,
@@ -85,5 +95,32 @@ def write(folder: Path) -> list[Path]:
     return files
 
 
+def utilisations(file: Path) -> dict[str, float]:
+    """State -> the largest share of the elastic limit that a design uses in it: assembled ("rest"),
+    deployed, and the largest on the way as its smooth net opens."""
+    from kop_exudyn.io.designs import load_design
+    from kop_exudyn.structures.strength import design_strength, materials_of, rod_strength
+
+    design = load_design(file)
+    found = {role: s.largest for role, s in design_strength(design, design.deploy()).items()}
+    opening = [
+        rod_strength(design.smooth, state, materials_of(design)).largest
+        for state in design.smooth_path
+    ]
+    return {**found, "opening": max(opening)}
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description="write the designs of this folder")
+    parser.add_argument(
+        "--measure", action="store_true", help="also deploy them; print utilisations"
+    )
+    measure = parser.parse_args(arguments).measure
+    for file in write(Path(__file__).resolve().parent):
+        if measure:
+            shares = utilisations(file).items()
+            print(file.stem, ", ".join(f"{state} {share:.3f}" for state, share in shares))
+
+
 if __name__ == "__main__":
-    write(Path(__file__).resolve().parent)
+    main()

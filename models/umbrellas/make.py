@@ -26,6 +26,8 @@ from kop_exudyn.structures.umbrella.layout import BaseMesh, Plates
 PLATES = Plates()
 EDGE = 30 + np.sqrt(3) * PLATES.thickness  # plates of 30 mm
 DENSITY = 9e-10  # tonnes / mm^3, polypropylene: weights in newtons with gravity in mm / s^2
+# N / mm^2: polypropylene yields at 30 to 40; plates ten times as stiff, of glass-fibre-filled nylon
+LIMITS = (35.0, 140.0)
 FOLDER = Path(__file__).resolve().parent
 
 
@@ -56,7 +58,9 @@ def make(name: str) -> dict[str, Any]:
     """The content of one design file."""
     base, height, size = DESIGNS[name]
     vertices, faces = height_field(height, size, 30)
-    return design_on_surface(name, base, vertices, faces, plates=PLATES, density=DENSITY)
+    return design_on_surface(
+        name, base, vertices, faces, plates=PLATES, density=DENSITY, limits=LIMITS
+    )
 
 
 if __name__ == "__main__":

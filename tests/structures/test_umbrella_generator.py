@@ -13,6 +13,7 @@ from kop_exudyn.errors import InputError
 from kop_exudyn.files.documents import check_schema
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.structures.fitting import TargetFitting
+from kop_exudyn.structures.strength import design_strength
 from kop_exudyn.structures.umbrella.generator import (
     design_on_surface,
     height_field,
@@ -128,3 +129,5 @@ def test_models_deploy_stably_near_their_target(repository, name):
     assert fit.max_percent < 5 and fit.mean_percent < 1.5
     confirmation = ExudynModel(design.scene()).confirm(state)
     assert confirmation.residual < 1e-6
+    strength = design_strength(design, {"deployed": state})["deployed"]
+    assert np.isfinite(strength.limit).all() and 0.2 < strength.largest < 0.6

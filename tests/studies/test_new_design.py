@@ -19,7 +19,7 @@ STAGES = StageSettings(relaxed_steps=4, path_steps=2, reassignments=1)
 def found(repository):
     """The third small design on a kit of the first one, with a weak and a strong w_c."""
     first, second, third = load_designs(repository / "models" / "small")
-    kit = cluster(first.groups, first.parameters, {"linear": 4, "angular": 2}).kit
+    kit = cluster(first.groups, first.parameters, {"linear": 6, "angular": 3}).kit
     return {factor: project_design(third, kit, factor, STAGES) for factor in (1e-2, 1e2)}
 
 

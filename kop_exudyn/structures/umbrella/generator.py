@@ -81,6 +81,7 @@ def design_on_surface(
     least_growth: float = LEAST_GROWTH,
     turn: float = 0.0,
     density: float | None = None,
+    limits: tuple[float, float] | None = None,
 ) -> dict[str, Any]:
     """The content of a design file: a base mesh laid on the middle of a surface.
 
@@ -89,6 +90,7 @@ def design_on_surface(
     least_growth : of the cell that grows least; it fixes how large a part of the surface is covered
     turn : rad, of the base mesh on the surface
     density : of arms and plates, tonnes / mm^3, for their weight
+    limits : elastic limits of arms and plates, N / mm^2, for their utilisation
 
     Raises InputError where the surface can't be flattened or the base mesh reaches beyond it.
     """
@@ -110,6 +112,7 @@ def design_on_surface(
     near = flat.around(scale * points)
     kept, where = np.unique(faces[near], return_inverse=True)
     weighing = {} if density is None else {"density": density}
+    arms, plate_rods = ({"elastic_limit": limit} for limit in limits) if limits else ({}, {})
     return {
         "format": "kop_exudyn/design",
         "version": 1,
@@ -129,8 +132,8 @@ def design_on_surface(
             "spacing": plates.spacing,
         },
         "materials": {
-            "arms": {"young": 1400.0, "poisson": 0.35, **weighing},
-            "plates": {"young": 14000.0, "poisson": 0.35, **weighing},
+            "arms": {"young": 1400.0, "poisson": 0.35, **weighing, **arms},
+            "plates": {"young": 14000.0, "poisson": 0.35, **weighing, **plate_rods},
         },
         "target": {
             "vertices": vertices[kept].round(3).tolist(),
