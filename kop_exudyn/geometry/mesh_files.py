@@ -1,72 +1,128 @@
-"""Triangle meshes from files: OBJ, PLY and STL, and the JSON files of COMPAS, whose polygons are
-split."""
+"""Triangle meshes from files: OBJ, PLY and STL, and the JSON files of COMPAS."""
 
 from __future__ import annotations
 
+import io
 import json
+import logging
 import os
-from collections.abc import Iterator, Mapping, Sequence
+import struct
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
+from .mesh_cleaning import WELD, cleaned, triangles_of
+from .obj_files import parse_obj
+
+log = logging.getLogger(__name__)
 
 COMPAS = ".json"
-MESH_SUFFIXES = (".obj", ".ply", ".stl", COMPAS)
+MOST_FACES = 1_000_000
+_SIZE_LIMIT = 128 * 2**20  # bytes
 
-_SIZE_LIMIT = 512 * 2**20  # bytes
+Mesh = tuple[np.ndarray, np.ndarray]
 
 
-def read_mesh(path: Path, field: str = "surface.file") -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (V, 3) and triangles (F, 3) of a mesh file. Raises InputError naming the file in
-    that field."""
+def read_mesh(
+    path: Path,
+    field: str = "surface.file",
+    *,
+    tolerance: float = WELD,
+    notes: list[str] | None = None,
+) -> Mesh:
+    """Vertices (V, 3) and triangles (F, 3) of a mesh file, as one surface (see `cleaned`).
+
+    field : of a design file, that errors name
+    tolerance : of the mesh's size, within which corners are welded
+    notes : takes what had to be cleaned, in words
+
+    Raises InputError naming the file in that field, also for files that are too large.
+    """
     suffix = path.suffix.lower()
-    if suffix not in MESH_SUFFIXES:
+    if suffix not in _READERS:
         raise InputError(
             f"is no mesh file (known: {', '.join(MESH_SUFFIXES)})", field=field, value=path.name
         )
     if not os.path.isfile(path):
         raise InputError("no such file", field=field, value=str(path))
     try:
-        vertices, faces = _compas_mesh(path) if suffix == COMPAS else _trimesh(path, field)
-    except InputError:
-        raise
+        vertices, faces = _READERS[suffix](_content(path))
+    except InputError as error:
+        place = f"{error.field}: " if error.field else ""
+        raise InputError(place + error.message, field=field, value=path.name) from None
     except Exception as error:  # the readers raise whatever the broken file leads them to
         raise InputError(
             f"can't be read as a mesh: {str(error)[:100]}", field=field, value=path.name
         ) from None
-    if (
-        vertices.ndim != 2
-        or vertices.shape[1] != 3
-        or not len(faces)
-        or not np.isfinite(vertices).all()
-    ):
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or not len(faces):
+        raise InputError("contains no faces", field=field, value=path.name)
+    if not np.isfinite(vertices).all():
         raise InputError("contains no faces between finite vertices", field=field, value=path.name)
+    _check_count(len(faces))
+    vertices, faces, found = cleaned(vertices, faces, tolerance)
+    if not len(faces):
+        raise InputError("contains no faces with an area", field=field, value=path.name)
+    for note in found:
+        log.info("%s: %s", path.name, note)
+    if notes is not None:
+        notes += found
     return vertices, faces
 
 
-def _trimesh(path: Path, field: str) -> tuple[np.ndarray, np.ndarray]:
-    try:
-        import trimesh
-    except ImportError:
+def _content(path: Path) -> bytes:
+    size = path.stat().st_size
+    if size > _SIZE_LIMIT:
         raise InputError(
-            "reading meshes needs trimesh (pip install trimesh)", field=field, value=path.name
-        ) from None
-    mesh = trimesh.load_mesh(path, process=True)
+            f"is larger than {_SIZE_LIMIT / 2**20:g} MB: some ten thousand faces are fine enough"
+        )
+    return path.read_bytes()
+
+
+def _check_count(n_faces: int) -> None:
+    if n_faces > MOST_FACES:
+        raise InputError(
+            f"has {n_faces:,} faces, at most {MOST_FACES:,} are read: some ten thousand are fine "
+            "enough"
+        )
+
+
+def _obj(content: bytes) -> Mesh:
+    found = parse_obj(content.decode("utf-8", errors="replace"))
+    _check_count(len(found.faces))
+    return found.vertices, triangles_of((face for face, _ in found.faces), found.vertices)
+
+
+def _stl(content: bytes) -> Mesh:
+    """Binary files say in their head how many faces they have, 50 bytes each."""
+    if len(content) >= 84:
+        (n_faces,) = struct.unpack("<I", content[80:84])
+        if len(content) == 84 + 50 * n_faces:
+            _check_count(n_faces)
+    return _by_trimesh(content, "stl")
+
+
+def _ply(content: bytes) -> Mesh:
+    return _by_trimesh(content, "ply")
+
+
+def _by_trimesh(content: bytes, kind: str) -> Mesh:
+    import trimesh
+
+    # from memory, so that nothing that the file names is opened
+    mesh = trimesh.load_mesh(io.BytesIO(content), file_type=kind, process=False)
     return np.array(mesh.vertices, float), np.array(mesh.faces, int)
 
 
-def _compas_mesh(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """The mesh of a file that COMPAS wrote with `Mesh.to_json` or `json_dump` (versions 1 and 2).
+def _compas(content: bytes) -> Mesh:
+    """The mesh of a file that COMPAS wrote with `Mesh.to_json` or `json_dump`, in versions 0 to 2.
 
     Coordinates that a vertex doesn't have are the mesh's default ones. Raises ValueError, KeyError
     or TypeError for something else.
     """
-    if path.stat().st_size > _SIZE_LIMIT:
-        raise ValueError("the file is too large")
-    found = list(_meshes(json.loads(path.read_text(encoding="utf-8"))))
+    found = list(_meshes(json.loads(content.decode("utf-8-sig"))))
     if len(found) != 1:
         raise ValueError(f"expected one COMPAS mesh, found {len(found)}")
     data = found[0]
@@ -76,17 +132,24 @@ def _compas_mesh(path: Path) -> tuple[np.ndarray, np.ndarray]:
         "z": 0.0,
         **data.get("default_vertex_attributes", data.get("dva", {})),
     }
-    numbers = {key: k for k, key in enumerate(data["vertex"])}
+    numbers = {_key(key): k for k, key in enumerate(data["vertex"])}
     vertices = np.array(
         [
             [float(attributes.get(axis, default[axis])) for axis in "xyz"]
             for attributes in data["vertex"].values()
         ]
     )
-    polygons = [[numbers[str(key)] for key in keys] for keys in data["face"].values()]
-    return vertices, np.array(
-        [t for polygon in polygons for t in _triangles(polygon, vertices)], int
+    _check_count(len(data["face"]))
+    polygons = (
+        [numbers[_key(key)] for key in (keys[:-1] if keys[:1] == keys[-1:] else keys)]
+        for keys in data["face"].values()
     )
+    return vertices, triangles_of(polygons, vertices)
+
+
+def _key(key: Any) -> str:
+    """A vertex's key; early versions wrote texts within texts."""
+    return str(key).strip("'\"")
 
 
 def _meshes(data: Any) -> Iterator[Mapping[str, Any]]:
@@ -103,13 +166,10 @@ def _meshes(data: Any) -> Iterator[Mapping[str, Any]]:
                 yield from _meshes(item)
 
 
-def _triangles(polygon: Sequence[int], vertices: np.ndarray) -> list[tuple[int, int, int]]:
-    """A polygon as triangles: a quad is cut along its shorter diagonal, others from their first
-    corner."""
-    if len(polygon) < 3 or len(set(polygon)) < len(polygon):
-        raise ValueError("a face needs three or more different vertices")
-    if len(polygon) == 4:
-        a, b, c, d = polygon
-        lengths = np.linalg.norm(vertices[[a, b]] - vertices[[c, d]], axis=1)
-        return [(a, b, c), (a, c, d)] if lengths[0] <= lengths[1] else [(a, b, d), (b, c, d)]
-    return [(polygon[0], b, c) for b, c in zip(polygon[1:], polygon[2:])]
+_READERS: dict[str, Callable[[bytes], Mesh]] = {
+    ".obj": _obj,
+    ".ply": _ply,
+    ".stl": _stl,
+    COMPAS: _compas,
+}
+MESH_SUFFIXES = tuple(_READERS)
