@@ -1,233 +1,254 @@
-"""Planar networks from drawn curves: pieces put together to whole curves, and written as a design
-file has them."""
+"""Networks from drawings: cleaned, put together to whole curves, laid into their plane, and written
+as a design file has them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..errors import InputError
-from ..files.documents import check_schema
-from ..geometry.curves import curve_from_dict
-from ..geometry.network import network
-from ..io.designs import DESIGN_VERSION
-from .curve_files import DrawnCurve, read_curves
+from ..geometry.curves import Curve, curve_from_dict
+from ..geometry.network import CurveNetwork, network
+from .cleaning import TOLERANCE, cleaned
+from .contacts import crossing_pieces, end_contacts
+from .curve_files import read_drawing
+from .drawing import Drawing, DrawnCurve, Finding, size_of
+from .frames import Frame, frame_of
+from .joins import join_ends
 
-_SAME_POINT = 1e-6  # of the drawing's size
-_FLAT = 1e-4  # of the size: how far a drawing may leave its plane
-_LARGEST_TURN = np.pi / 4  # rad; pieces that meet at a larger one are two curves with a joint
 _DIGITS = 9  # of the size, that points are written with
-_PLANES = ((0, 1), (0, 2), (1, 2))
+_SUSPICIOUS = (
+    20.0  # times the tolerance: ends that stop so near to another curve may be meant on it
+)
+_WHOLE_SPAN = 0.3  # of the median span: longer free ends look like a joint was missed
 
-End = tuple[int, int]  # number of the curve; 0: its first point, -1: its last
+
+@dataclass(frozen=True)
+class ReadingOptions:
+    """How a drawing is read.
+
+    layers : of DXF files, those to read; default: all that can be seen
+    kind : "spline": curves go smoothly through all points; "polyline": with the corners drawn
+    scale : units of the design in one of the drawing
+    free_ends : whether rods go on beyond their last joint
+    join : "auto", "always" or "never", see `join_ends`
+    tolerance : share of the drawing's size, see `cleaned`
+    """
+
+    layers: Sequence[str] = ()
+    kind: str = "spline"
+    scale: float = 1.0
+    free_ends: bool = False
+    join: str = "auto"
+    tolerance: float = TOLERANCE
+
+
+@dataclass(frozen=True)
+class DrawnNetwork:
+    """What was understood of a drawing.
+
+    drawing : as it was read; options : how
+    curves : whole curves, in the drawing's coordinates
+    frame : the plane that they were laid into
+    entries : the field `curves` of a design file
+    findings : what a reader should know
+    """
+
+    drawing: Drawing
+    options: ReadingOptions
+    curves: list[DrawnCurve]
+    frame: Frame
+    entries: list[dict[str, Any]]
+    findings: list[Finding] = field(default_factory=list)
+
+    @property
+    def labels(self) -> list[str]:
+        """What the curves are called in the drawing."""
+        return [curve.label for curve in self.curves]
+
+    @cached_property
+    def network(self) -> CurveNetwork:
+        """The curves, joined where they cross. Raises InputError, naming the curve as the drawing
+        does, where no network comes of them (see `network.network`)."""
+        try:
+            return network(self._curves(), free_ends=self.options.free_ends, acute=True)
+        except InputError as error:
+            raise self.named(error) from None
+
+    def named(self, error: InputError) -> InputError:
+        """An error about a design with the curves named as in the drawing."""
+
+        def label(found: re.Match) -> str:
+            number = int(found[1])
+            return self.labels[number] if number < len(self.labels) else found[0]
+
+        def renamed(text: str) -> str:
+            return re.sub(r"(?:network\.)?curves\[(\d+)\](?:\.points)?", label, text)
+
+        field = None if error.field is None else renamed(error.field)
+        return InputError(
+            renamed(error.message), source=error.source, field=field, value=error.value
+        )
+
+    def _curves(self) -> list[Curve]:
+        return [curve_from_dict(e, f"curves[{k}]") for k, e in enumerate(self.entries)]
 
 
 def read_network(
-    path: str | Path,
-    layers: Sequence[str] = (),
-    *,
-    kind: str = "spline",
-    scale: float = 1.0,
-    free_ends: bool = False,
-) -> list[dict[str, Any]]:
-    """The field `curves` of a design file, from an OBJ or DXF file; see `read_curves` and
-    `network_curves`.
+    path: str | Path, options: ReadingOptions = ReadingOptions(), *, space: bool = False
+) -> DrawnNetwork:
+    """The network that an OBJ or DXF file draws.
 
-    Raises InputError, naming the curve as the drawing does, where no network comes of it (see
-    `network.network`).
+    space : whether nets that don't lie in a plane are taken, as seen along an axis
+
+    Raises InputError for files that can't be read and drawings that are in no plane.
     """
-    drawn = read_curves(path, layers)
+    drawing = read_drawing(path, options.layers)
     try:
-        entries, labels = network_curves(drawn, kind, scale)
-        network(
-            [curve_from_dict(entry, label) for entry, label in zip(entries, labels)],
-            free_ends=free_ends,
-        )
+        return drawn_network(drawing, options, space=space)
     except InputError as error:
         raise error.at(path) from None
-    return entries
 
 
-def c_shell_data(
-    name: str,
-    curves: Sequence[Mapping[str, Any]],
-    section: Mapping[str, Any],
-    material: Mapping[str, Any],
-    opening: float,
-    *,
-    free_ends: bool = False,
-) -> dict[str, Any]:
-    """The content of a C-shell's design file, see c_shell.schema.json. Raises InputError for values
-    that can't be."""
-    data = {
-        "format": "kop_exudyn/design",
-        "version": DESIGN_VERSION,
-        "class": "c_shell",
-        "name": name,
-        "material": dict(material),
-        "section": dict(section),
-        "curves": list(curves),
-        "crossings": "find",
-        "free_ends": free_ends,
-        "opening": {"angle": opening},
-    }
-    check_schema(data, "c_shell")
-    return data
-
-
-def grid_data(
-    name: str,
-    curves: Sequence[Mapping[str, Any]],
-    section: Mapping[str, Any],
-    material: Mapping[str, Any],
-    surface: str,
-    held: str | Sequence[int] | None = None,
-) -> dict[str, Any]:
-    """The content of a grid's design file, see grid.schema.json: curves in plan on the mesh of a
-    file.
-
-    surface : path of the mesh, relative to the design file
-    held : joints that keep their places, see `Grid`
-    """
-    data = {
-        "format": "kop_exudyn/design",
-        "version": DESIGN_VERSION,
-        "class": "grid",
-        "name": name,
-        "material": dict(material),
-        "section": dict(section),
-        "surface": {"type": "mesh", "file": surface},
-        "network": {"type": "curves", "curves": list(curves)},
-    }
-    if held is not None:
-        data["held"] = held
-    check_schema(data, "grid")
-    return data
-
-
-def network_curves(
-    curves: Sequence[DrawnCurve], kind: str = "spline", scale: float = 1.0
-) -> tuple[list[dict[str, Any]], list[str]]:
-    """The field `curves` of a design file, and what each of them is called in the drawing.
-
-    kind : "spline": smooth through all points; "polyline": with the corners that are drawn. Two
-        points are a line.
-    scale : the design's unit in the drawing's
-
-    Pieces that meet end to end without a sharp corner are one curve: many programs write every edge
-    for itself. Raises InputError where the drawing isn't in a coordinate plane.
-    """
-    size = float(np.linalg.norm(np.ptp(np.concatenate([curve.points for curve in curves]), axis=0)))
+def drawn_network(
+    drawing: Drawing, options: ReadingOptions = ReadingOptions(), *, space: bool = False
+) -> DrawnNetwork:
+    """The network of a drawing, see `read_network`."""
+    size = size_of(drawing.curves)
     if not size > 0:
         raise InputError("all points are the same")
-    axes = _plane(curves, size)
-    digits = _DIGITS - int(np.floor(np.log10(size * scale)))
-    entries, labels = [], []
-    for curve in joined(
-        [_without_repetitions(curve, _SAME_POINT * size) for curve in curves], _SAME_POINT * size
-    ):
-        points = (scale * curve.points[:, axes]).round(digits).tolist()
-        entries.append(
-            {"type": "polyline" if len(points) == 2 else kind, "points": points}
-            | ({"closed": True} if curve.closed else {})
+    tolerance = options.tolerance * size
+    findings = [Finding("skipped", text) for text in drawing.skipped]
+    curves, done = cleaned(drawing.curves, tolerance)
+    if not curves:
+        raise InputError("contains no curves that are longer than the tolerance")
+    frame = frame_of(curves, size)
+    if not frame.flat and not space:
+        extent = np.ptp(np.concatenate([c.points for c in curves]), axis=0)
+        raise InputError(
+            "the curves must lie in a plane; they extend by "
+            f"{', '.join(f'{length:.4g}' for length in extent)} along x, y, z, and leave the "
+            f"nearest plane by {100 * frame.height:.2g} % of their size"
         )
-        labels.append(curve.label)
-    return entries, labels
-
-
-def joined(curves: Sequence[DrawnCurve], tolerance: float) -> list[DrawnCurve]:
-    """The curves, with those put together that go on in each other; every end at most once, the
-    straightest first."""
-    links = _links(curves, tolerance)
-    starts = [
-        (k, end)
-        for k, curve in enumerate(curves)
-        for end in (0, -1)
-        if curve.closed or (k, end) not in links
-    ]
-    starts += [(k, 0) for k in range(len(curves))]  # loops have no end to start from
-    found, used = [], set()
-    for start in starts:
-        if start[0] in used:
-            continue
-        chain = list(_chain(start, links))
-        used |= {k for k, _ in chain}
-        found.append((min(k for k, _ in chain), _put_together(curves, chain, links)))
-    return [curve for _, curve in sorted(found, key=lambda entry: entry[0])]
-
-
-def _links(curves: Sequence[DrawnCurve], tolerance: float) -> dict[End, End]:
-    """Which end goes on in which."""
-    ends = [(k, end) for k, curve in enumerate(curves) if not curve.closed for end in (0, -1)]
-    if not ends:
-        return {}
-    points = np.array([curves[k].points[end] for k, end in ends])
-    inward = np.array([_inward(curves[k].points, end) for k, end in ends])
-    pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
-    cosines = -(inward[pairs[:, 0]] * inward[pairs[:, 1]]).sum(axis=1)
-    links: dict[End, End] = {}
-    for n in np.lexsort((pairs[:, 1], pairs[:, 0], -cosines.round(9))):
-        a, b = (ends[number] for number in pairs[n])
-        if cosines[n] >= np.cos(_LARGEST_TURN) and a not in links and b not in links:
-            links[a], links[b] = b, a
-    return links
-
-
-def _inward(points: np.ndarray, end: int) -> np.ndarray:
-    """Unit direction (3,) in which a curve leaves one of its ends."""
-    step = points[1] - points[0] if end == 0 else points[-2] - points[-1]
-    return step / np.linalg.norm(step)
-
-
-def _chain(start: End, links: dict[End, End]) -> Iterator[End]:
-    """The pieces that follow each other, each by the end at which it begins."""
-    here = start
-    while True:
-        yield here
-        following = links.get((here[0], -1 if here[1] == 0 else 0))
-        if following is None or following[0] == start[0]:
-            return
-        here = following
-
-
-def _put_together(
-    curves: Sequence[DrawnCurve], chain: Sequence[End], links: dict[End, End]
-) -> DrawnCurve:
-    first = curves[chain[0][0]]
-    if first.closed or len(chain) == 1 and chain[0] not in links:
-        return first
-    pieces = [curves[k].points if end == 0 else curves[k].points[::-1] for k, end in chain]
-    points = np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
-    closed = chain[0] in links  # the end where it began goes on as well
-    label = first.label if len(chain) == 1 else f"{first.label} and {len(chain) - 1} more"
-    return DrawnCurve(points[:-1] if closed else points, closed, label)
-
-
-def _without_repetitions(curve: DrawnCurve, tolerance: float) -> DrawnCurve:
-    """Without points that are the ones before; closed where the ends are the same."""
-    steps = np.linalg.norm(np.diff(curve.points, axis=0), axis=1)
-    points = curve.points[np.append(True, steps > tolerance)]
-    closed = curve.closed
-    if len(points) > 3 and np.linalg.norm(points[-1] - points[0]) <= tolerance:
-        points, closed = points[:-1], True
-    if len(points) < 2:
-        raise InputError("is a single point", field=curve.label)
-    return DrawnCurve(points, closed, curve.label)
-
-
-def _plane(curves: Sequence[DrawnCurve], size: float) -> list[int]:
-    """The two axes of the coordinate plane that the drawing is in; the first such plane of xy, xz,
-    yz."""
-    extent = np.ptp(np.concatenate([curve.points for curve in curves]), axis=0)
-    for axes in _PLANES:
-        height = extent[3 - sum(axes)]
-        if height <= _FLAT * size:
-            return list(axes)
-    raise InputError(
-        f"the curves must lie in a plane parallel to the axes; they extend by "
-        f"{', '.join(f'{length:.4g}' for length in extent)} along x, y, z"
+    if frame.flat and not frame.standard:
+        where = f"turned by {np.degrees(frame.tilt):.3g}° against the xy plane"
+        findings.append(Finding("cleaned", f"the drawing's plane, {where}, is laid flat"))
+    flat = [frame(curve.points)[:, :2] for curve in curves]
+    joined = join_ends(
+        curves, crossing_pieces(curves, flat, tolerance, size), tolerance, options.join
     )
+    curves, ends = _ends_on_curves(joined.curves, frame, options, tolerance)
+    findings += [*done, *_about_joins(joined), *ends]
+    entries = [_entry(curve, frame, options, size) for curve in curves]
+    return DrawnNetwork(drawing, options, curves, frame, entries, findings)
+
+
+def _entry(curve: DrawnCurve, frame: Frame, options: ReadingOptions, size: float) -> dict[str, Any]:
+    digits = _DIGITS - int(np.floor(np.log10(size * options.scale)))
+    points = (options.scale * frame(curve.points)[:, :2]).round(digits).tolist()
+    kind = "polyline" if len(points) == 2 else options.kind
+    return {"type": kind, "points": points} | ({"closed": True} if curve.closed else {})
+
+
+def _about_joins(joined: Any) -> list[Finding]:
+    """What was joined and what was hinged, in words."""
+    found = []
+    if len(joined.seams):
+        text = f"{len(joined.seams)} seams joined: pieces that go on in each other"
+        found.append(Finding("joined", text, joined.seams))
+    if len(joined.tips):
+        text = f"{len(joined.tips)} tips hinged: ends that meet and are of different curves"
+        found.append(Finding("hinged", text, joined.tips))
+    if len(joined.by_turn):
+        text = (
+            f"at {len(joined.by_turn)} of these places the two families say nothing, or the curve "
+            "has a corner: the turn alone decided (--join always or never decides otherwise)"
+        )
+        found.append(Finding("suspicious", text, joined.by_turn))
+    if not joined.families:
+        text = (
+            "the curves don't fall into two families that cross only each other: they brace each "
+            "other and will hardly open like scissors"
+        )
+        found.append(Finding("suspicious", text))
+    return found
+
+
+def _ends_on_curves(
+    curves: list[DrawnCurve], frame: Frame, options: ReadingOptions, tolerance: float
+) -> tuple[list[DrawnCurve], list[Finding]]:
+    """Ends within the tolerance of another curve brought onto it; and what looks like a miss."""
+    plain = replace(options, scale=1.0)
+    size = size_of(curves)
+    flat = [curve_from_dict(_entry(curve, frame, plain, size), curve.label) for curve in curves]
+    contacts = end_contacts(flat, _SUSPICIOUS * tolerance)
+    exact = 1e-6 * size
+    reached = {(c.curve, c.end) for c in contacts if abs(c.beyond) <= exact}
+    points = [curve.points.copy() for curve in curves]
+    moved: list[np.ndarray] = []
+    largest, near = 0.0, []
+    for contact in sorted(contacts, key=lambda c: abs(c.beyond)):
+        place = (contact.curve, contact.end)
+        if place in reached or abs(contact.beyond) <= exact:
+            continue
+        short = contact.beyond < 0
+        if abs(contact.beyond) <= tolerance and (short or options.free_ends):
+            height = frame(points[contact.curve][contact.end])[2]
+            spot = frame.back(np.append(contact.position, height))
+            points[contact.curve][contact.end] = spot
+            reached.add(place)
+            moved.append(spot)
+            largest = max(largest, abs(contact.beyond))
+        elif short and contact.beyond < -tolerance:
+            near.append(contact)
+    found = []
+    if moved:
+        text = f"{len(moved)} ends brought onto the curves beside them, by {largest:.3g} at most"
+        found.append(Finding("cleaned", text, np.array(moved)))
+    found += _missed(curves, flat, frame, [c for c in near if (c.curve, c.end) not in reached])
+    return [replace(curve, points=x) for curve, x in zip(curves, points)], found
+
+
+def _missed(
+    curves: Sequence[DrawnCurve], flat: Sequence[Curve], frame: Frame, near: Sequence[Any]
+) -> list[Finding]:
+    """Ends whose last joint is far back, and that stop a little short of another curve."""
+    found = []
+    for contact in near:
+        end = curves[contact.curve].points[contact.end]
+        tail = flat[contact.curve].length * _WHOLE_SPAN / max(len(flat) / 4, 1)
+        others = [
+            c
+            for c in end_contacts([flat[contact.curve], flat[contact.other]], 0.0)
+            if c.curve == 0 and c.end == contact.end and c.beyond <= tail
+        ]
+        if not others:
+            text = (
+                f"{curves[contact.curve].label} ends {-contact.beyond:.3g} short of "
+                f"{curves[contact.other].label}: a joint may be meant (--tolerance)"
+            )
+            found.append(Finding("suspicious", text, end[None]))
+    return found
+
+
+def network_summary(found: CurveNetwork) -> Mapping[str, Any]:
+    """Figures of a network, lengths in its own unit: joints, spans, angles between its families."""
+    spans = np.concatenate([strand.lengths for strand in found.strands])
+    angles = np.degrees(found.opening_angles[found.opens])
+    return {
+        "curves": len(found.strands),
+        "joints": found.n_joints,
+        "spans": len(spans),
+        "shortest_span": float(spans.min()) if len(spans) else None,
+        "median_span": float(np.median(spans)) if len(spans) else None,
+        "longest_span": float(spans.max()) if len(spans) else None,
+        "size": found.size,
+        "mean_angle_deg": float(angles.mean()) if len(angles) else None,
+        "families": bool(found.opens.all()),
+    }

@@ -52,6 +52,32 @@ def find_crossings(curves: Sequence[Curve]) -> list[Crossing]:
     return [crossing for found in _search(curves).values() for crossing in found]
 
 
+def near_crossings(curves: Sequence[Curve], reach: float) -> list[Crossing]:
+    """Crossings of different curves that go on straight beyond their ends by up to `reach`; their
+    stations there are negative, or larger than the length.
+
+    Curves that touch or cross themselves are passed over.
+    """
+    pieces = _Pieces(curves)
+    i, j = pieces.meeting(2 * reach)
+    apart = pieces.curve[i] != pieces.curve[j]
+    i, j = i[apart], j[apart]
+    if not len(i):
+        return []
+    a, b = pieces.curve[i], pieces.curve[j]
+    lengths = np.array([curve.length for curve in curves])
+    closed = np.array([curve.closed for curve in curves])
+    s, t, gap, sine = _polish(curves, lengths, a, b, *_chord_crossing(pieces, i, j))
+    good = _on(closed[a], lengths[a], s, reach) & _on(closed[b], lengths[b], t, reach)
+    good &= (gap <= 1e-3 * TOLERANCE * size_of(curves)) & (np.abs(sine) > np.sin(_LEAST_ANGLE))
+    keep = np.flatnonzero(good)
+    x = _frames(curves, a[keep], s[keep])[0]
+    return [
+        Crossing((int(a[k]), int(b[k])), (float(s[k]), float(t[k])), x[n])
+        for n, k in enumerate(keep.tolist())
+    ]
+
+
 def given_crossings(curves: Sequence[Curve], listed: Sequence[Mapping[str, Any]]) -> list[Crossing]:
     """The crossings listed as {"curves": [a, b], "near": [x, y]}; "near" may be left out where two
     curves cross once.

@@ -123,9 +123,13 @@ class MeshSurface(Surface):
             )
 
 
-def load_mesh_surface(path: Path, chart: str = "plane", up: str = "z") -> MeshSurface:
-    """The surface of a mesh file, see `read_mesh`. Raises InputError naming the file."""
-    return MeshSurface(*read_mesh(path), chart, up)
+def load_mesh_surface(
+    path: Path, chart: str = "plane", up: str = "z", scale: float = 1.0
+) -> MeshSurface:
+    """The surface of a mesh file, see `read_mesh`, its lengths times the scale. Raises InputError
+    naming the file."""
+    vertices, faces = read_mesh(path)
+    return MeshSurface(scale * vertices, faces, chart, up)
 
 
 def is_disc(mesh: TriangleSurface) -> bool:

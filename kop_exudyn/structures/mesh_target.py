@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -13,13 +15,25 @@ from ..geometry.triangles import TriangleSurface
 from .base import Target
 
 _MAX_ITERATIONS = 200
+_SQUARE = 1e-6
 _SETTLED = 1e-6  # of the joints' size, by which an iteration moves them
 
 
-def load_target_mesh(path: Path) -> TriangleSurface:
-    """The mesh of a file. Raises InputError, naming the field "target.file", where it contains no
-    usable one."""
+def load_target_mesh(data: Mapping[str, Any], folder: Path) -> TriangleSurface:
+    """The mesh that a design file's field "target" names, in the design's units and axes.
+
+    data : "file", relative to the folder; "scale", "origin" (3,) and "axes" (3, 3) bring its points
+        x to scale axes (x - origin)
+
+    Raises InputError, naming the field "target.file", where it contains no usable mesh.
+    """
+    path = folder / data["file"]
     vertices, faces = read_mesh(path, "target.file")
+    axes = np.array(data.get("axes", np.eye(3)), float)
+    if axes.shape != (3, 3) or np.abs(axes @ axes.T - np.eye(3)).max() > _SQUARE:
+        raise InputError("expected three unit vectors at right angles", field="target.axes")
+    origin = np.array(data.get("origin", (0.0, 0.0, 0.0)), float)
+    vertices = float(data.get("scale", 1.0)) * (vertices - origin) @ axes.T
     try:
         return TriangleSurface(vertices, faces)
     except InputError as error:

@@ -237,11 +237,7 @@ def read_c_shell(data: Mapping[str, Any], source: str) -> CShell:
             int(data.get("elements_per_piece", 2)),
         )
         opening = data["opening"]
-        mesh = (
-            load_target_mesh(Path(source).parent / data["target"]["file"])
-            if "target" in data
-            else None
-        )
+        mesh = load_target_mesh(data["target"], Path(source).parent) if "target" in data else None
         return CShell(
             data["name"],
             network_from_dict(data),

@@ -225,6 +225,7 @@ def _surface(data: Mapping[str, Any], source: str) -> Surface:
             Path(source).parent / options["file"],
             options.get("chart", "plane"),
             options.get("up", "z"),
+            float(options.get("scale", 1.0)),
         )
     raise InputError(
         "unknown kind of surface (known: analytic, mesh)", field="surface.type", value=data["type"]

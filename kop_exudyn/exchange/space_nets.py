@@ -1,0 +1,109 @@
+"""Nets that are drawn in space: the surface that they lie on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.interpolate import RBFInterpolator
+
+from ..errors import InputError
+from .drawing import Finding
+from .drawn_networks import DrawnNetwork
+
+_CELLS = 40  # of the surface's mesh, along each side
+_MARGIN = 0.08  # of the plan's size, by which the mesh goes beyond the net
+_NEIGHBOURS = 60  # points that shape the surface at a place
+_APART = 0.02  # of the size: curves that cross in plan and are farther apart pass each other
+_NOTED = 1e-3  # of the size: such distances are worth a word
+UPS = {(0, 1): "z", (2, 0): "y", (1, 2): "x"}
+
+
+def surface_through(drawn: DrawnNetwork) -> tuple[np.ndarray, np.ndarray, str]:
+    """Vertices (V, 3) and faces (F, 3), in the design's units, of a smooth surface through a net
+    that is drawn in space, and the axis ("x", "y" or "z") across which it is a height field.
+
+    It is the thin-plate spline through the curves' points (Duchon 1977).
+
+    Raises InputError where the net folds over, seen along that axis.
+    """
+    axes = drawn.frame.axes
+    up = UPS[(int(np.argmax(axes[0])), int(np.argmax(axes[1])))]
+    points = np.concatenate([_densely(curve.points, curve.closed) for curve in drawn.curves])
+    local = drawn.options.scale * drawn.frame(points)
+    plan, kept = np.unique(local[:, :2].round(12), axis=0, return_index=True)
+    heights = local[kept, 2]
+    centre, size = plan.mean(axis=0), float(np.linalg.norm(np.ptp(plan, axis=0)))
+    near = _thinned((plan - centre) / size)
+    spline = RBFInterpolator(
+        (plan[near] - centre) / size, heights[near], neighbors=min(_NEIGHBOURS, len(near))
+    )
+    low, high = plan.min(axis=0) - _MARGIN * size, plan.max(axis=0) + _MARGIN * size
+    u, v = (np.linspace(a, b, _CELLS + 1) for a, b in zip(low, high))
+    grid = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
+    z = spline((grid - centre) / size)
+    if not np.isfinite(z).all():
+        raise InputError("folds over, seen along its shortest side: give its --surface")
+    vertices = np.column_stack([grid, z]) @ axes
+    k = np.arange((_CELLS + 1) ** 2).reshape(_CELLS + 1, _CELLS + 1)
+    a, b, c, d = (q.ravel() for q in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return vertices, faces, up
+
+
+def with_heights_checked(drawn: DrawnNetwork) -> DrawnNetwork:
+    """The same net, with a finding where curves that cross in plan are apart in space.
+
+    Raises InputError, naming the curves, where they pass each other.
+    """
+    net, scale = drawn.network, drawn.options.scale
+    apart = []
+    for joint, (pair, place) in enumerate(zip(net.pairs, net.places)):
+        heights = [
+            _height_at(drawn, int(c), float(net.strands[c].stations[k]))
+            for c, k in zip(pair, place)
+        ]
+        apart.append(abs(heights[0] - heights[1]) * scale)
+        if apart[-1] > _APART * net.size:
+            x, y = net.joints[joint]
+            first, second = (drawn.labels[c] for c in pair)
+            raise InputError(
+                f"passes {second} at a distance of {apart[-1]:.3g} where they cross in plan, at "
+                f"({x:.6g}, {y:.6g}): laths are hinged where they meet",
+                field=first,
+            )
+    largest = max(apart)
+    if largest <= _NOTED * net.size:
+        return drawn
+    text = f"curves are up to {largest:.3g} apart in space where they cross; hinged all the same"
+    return replace(drawn, findings=[*drawn.findings, Finding("suspicious", text)])
+
+
+def _height_at(drawn: DrawnNetwork, curve: int, station: float) -> float:
+    """Height of a drawn curve over the plan's arc length, by its polyline."""
+    local = drawn.frame(drawn.curves[curve].points)
+    if drawn.curves[curve].closed:
+        local = np.concatenate([local, local[:1]])
+    steps = np.linalg.norm(np.diff(local[:, :2], axis=0), axis=1)
+    stations = np.concatenate([[0.0], np.cumsum(steps)])
+    share = station / drawn.network.strands[curve].curve.length
+    return float(np.interp(share * stations[-1], stations, local[:, 2]))
+
+
+def _densely(points: np.ndarray, closed: bool) -> np.ndarray:
+    """A curve's points and a few between each two, on the smooth curve through them."""
+    from scipy.interpolate import CubicSpline
+
+    if closed:
+        points = np.concatenate([points, points[:1]])
+    t = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    if len(points) < 3:
+        return points[0] + np.linspace(0, 1, 20)[:, None] * (points[1] - points[0])
+    spline = CubicSpline(t, points, bc_type="periodic" if closed else "natural")
+    inner = np.linspace(t[:-1], t[1:], max(2, 200 // len(points)), endpoint=False).T.ravel()
+    return spline(np.append(inner, t[-1]))
+
+
+def _thinned(plan: np.ndarray, step: float = 2e-3) -> np.ndarray:
+    """Numbers of points (n, 2) no two of which share a cell of a fine grid."""
+    return np.sort(np.unique(np.round(plan / step).astype(int), axis=0, return_index=True)[1])
