@@ -4,29 +4,38 @@ our own."""
 from __future__ import annotations
 
 import argparse
-import os
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .output import add_json, report
 from .values import angle, held_joints, number_pair, patch, positive_number
 
+if TYPE_CHECKING:
+    from ..exchange.drawing import Finding
+    from ..exchange.drawn_networks import DrawnNetwork, ReadingOptions
+    from ..exchange.imports import Imported
+    from ..units import Units
+
 HELP = "turn a drawing, a surface or a released umbrella mesh into a design file"
 DESCRIPTION = """Writes a design file from
 
-  a drawing (.obj: its polylines; .dxf, with the extra [fab]: lines, polylines, arcs, circles, ellipses, splines):
+  a drawing (.obj: its polylines; .dxf, with the extra [fab]: lines, polylines, arcs, circles, ellipses, splines, blocks):
   a C-shell, its curves hinged wherever they cross; or, with --as grid, a grid of lamellas over its curves on a surface,
-  drawn in plan. The drawing lies in a plane parallel to two axes. Pieces that meet end to end without a sharp corner
-  become one curve.
+  drawn in plan, or on the net's own surface where it is drawn in space. Drawings of C-shells lie in a plane. Pieces that
+  go on in each other become one curve; ends that meet and are of the two different families are hinged.
 
   a surface (with --patch; a mesh: .obj, .ply, .stl, or .json of COMPAS): an umbrella mesh in the shape of its middle,
   in millimetres, the arms as long as the cells have to grow.
 
   an umbrella mesh in the format of its public release (.json or .json.gz): the same mesh, in millimetres. Such files
-  can also be used directly wherever a design is expected."""  # noqa: E501  # a command on one line can be copied
+  can also be used directly wherever a design is expected.
+
+What was understood is printed, and drawn with --preview; without --out that is all that is done."""  # noqa: E501  # a command on one line can be copied
 EXAMPLES = """examples:
-  kop import net.dxf --out net.json --opening 0.6 --section 0.03,0.004 --material 2.1e9,0.35
-  kop import net.obj --as c_shell --out net.json --opening 35deg --section 30,4 --material 2100,0.35 --scale 1000
+  kop import net.dxf --preview net.html
+  kop import net.dxf --out net.json --opening 0.6 --section 0.03,0.004 --material 2.1e9,0.35 --unit m
+  kop import net.obj --as c_shell --out net.json --opening 35deg --section 30,4 --material 2100,0.35 --scale 1000 --unit mm
   kop import plan.dxf --as grid --surface vault.obj --out vault.json --section 0.004,0.05 --material 1.1e10,0.3
   kop import dome.ply --as umbrella --patch hexagon,3 --out dome.json --scale 1000
   kop import hemisphere_5t.json.gz --out hemisphere.json --plates rigid"""  # noqa: E501  # a command on one line can be copied
@@ -42,8 +51,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="drawing (.obj, .dxf), surface (.obj, .ply, .stl, "
         ".json) or released umbrella mesh (.json, .json.gz)",
     )
+    parser.add_argument("--out", type=Path, metavar="DESIGN", help="design file to write (.json)")
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="DESIGN", help="design file to write (.json)"
+        "--preview",
+        type=Path,
+        metavar="PAGE",
+        help="page (.html) that shows what was understood: curves, joints, joins, doubts",
     )
     parser.add_argument(
         "--as",
@@ -51,17 +64,18 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         choices=_CLASSES,
         help="class of the design (default: c_shell of .obj and .dxf, umbrella of others)",
     )
-    parser.add_argument("--overwrite", action="store_true", help="replace the file if it exists")
+    parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
     shell = parser.add_argument_group(
         "drawings",
-        "section and material are needed, of C-shells also the opening, of grids also the surface",
+        "section and material are needed, of C-shells also the opening, of grids also the surface "
+        "unless the net is drawn in space",
     )
     shell.add_argument(
         "--opening",
         type=angle,
         metavar="ANGLE",
-        help="change of the mean angle between curves from "
-        "assembly to deployment, in radians or as 35deg",
+        help="change of the mean angle between the two families of curves from assembly to "
+        "deployment, in radians or as 35deg; positive: the narrow angles open",
     )
     shell.add_argument(
         "--surface",
@@ -69,6 +83,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="MESH",
         help="mesh (.obj, .ply, .stl, COMPAS .json) that the "
         "grid lies on, above the drawing in the z direction",
+    )
+    shell.add_argument(
+        "--chart",
+        choices=("plane", "conformal"),
+        default="plane",
+        help="of a grid: its curves are drawn in plan, or in space on a surface that may overhang "
+        "(default: %(default)s)",
     )
     shell.add_argument(
         "--target",
@@ -120,16 +141,41 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="of DXF files, the layer to read; may be given several times (default: all)",
+        help="of DXF files, the layer to read, hidden or not; may be given several times "
+        "(default: all that can be seen)",
+    )
+    shell.add_argument(
+        "--join",
+        choices=("auto", "always", "never"),
+        default="auto",
+        help="whether curves that meet end to end are one: where that keeps the two families apart, "
+        "where they turn by less than 45 degrees, or never (default: %(default)s)",
+    )
+    shell.add_argument(
+        "--tolerance",
+        type=positive_number,
+        metavar="SHARE",
+        help="of the drawing's size: points, ends and curves nearer to each other are the same "
+        "(default: 2e-4)",
+    )
+    shell.add_argument(
+        "--unit",
+        choices=("mm", "cm", "m", "in", "ft"),
+        help="the design's unit of length (default: the drawing's, as far as it is known)",
+    )
+    shell.add_argument(
+        "--force-unit",
+        choices=("N", "kN", "MN", "lbf", "kip"),
+        default="N",
+        help="the design's unit of force (default: %(default)s)",
     )
     shell.add_argument(
         "--scale",
         type=positive_number,
-        default=1.0,
         metavar="S",
-        help="multiply the coordinates of "
-        "drawings and of umbrella meshes' surfaces by this, as 0.001 for millimetres to metres "
-        "(default: 1)",
+        help="multiply the coordinates of drawings, of their surfaces and targets, and of umbrella "
+        "meshes' surfaces by this, as 0.001 for millimetres to metres (default: from the drawing's "
+        "unit to --unit where both are known, otherwise 1)",
     )
     umbrella = parser.add_argument_group("umbrella meshes")
     umbrella.add_argument(
@@ -160,95 +206,156 @@ def run(args: argparse.Namespace) -> int:
     from ..errors import InputError
     from ..exchange.curve_files import CURVE_READERS
     from ..files.files import check_output_file
-    from ..files.json_files import write_json
 
-    check_output_file(args.out, overwrite=args.overwrite)
+    if args.out is None and args.preview is None:
+        raise InputError("nothing to do: give --out, --preview or both", source=args.file)
+    for path in filter(None, (args.out, args.preview)):
+        check_output_file(path, overwrite=args.overwrite)
     drawn = args.file.suffix.lower() in CURVE_READERS
     wanted = args.kind or ("c_shell" if drawn and args.patch is None else "umbrella")
-    if wanted != "umbrella" and not drawn:
+    if wanted == "umbrella":
+        return _umbrella(args)
+    if not drawn:
         raise InputError(
             f"can't be made of this file: expected {' or '.join(CURVE_READERS)}",
             source=args.file,
             field="--as",
             value=wanted,
         )
-    data = {"c_shell": _c_shell, "grid": _grid, "umbrella": _umbrella}[wanted](args)
-    write_json(args.out, data, overwrite=args.overwrite)
-    report(
-        args, {"design": args.out, "class": data["class"], "name": data["name"]}, f"{args.out}\n"
-    )
+    return _drawing(args, wanted)
+
+
+def _drawing(args: argparse.Namespace, wanted: str) -> int:
+    """A C-shell or a grid of a drawn net; its preview also where no design comes of it."""
+    from ..errors import InputError
+    from ..exchange.imports import read_scaled
+    from ..units import Units
+
+    if args.out is not None:
+        _require(args, wanted, *(["opening"] * (wanted == "c_shell")), "section", "material")
+    units = None if args.unit is None else Units(args.unit, args.force_unit)
+    in_space = wanted == "grid"
+    drawn, units = read_scaled(args.file, _reading(args), args.scale, units, space=in_space)
+    if units is not None:
+        units = Units(units.length, args.force_unit)
+    try:
+        made = None if args.out is None else _made(args, wanted, drawn, units)
+        drawn.network  # which says what is wrong with it
+    except InputError as error:
+        error = error.at(args.file)
+        if args.preview is not None:
+            _save_preview(args, drawn, drawn.findings, units, refused=str(error))
+        raise error from None
+    findings = drawn.findings if made is None else made.findings
+    if made is not None:
+        drawn = made.drawn
+        _write(args, made)
+    if args.preview is not None:
+        _save_preview(args, drawn, findings, units)
+    _tell(args, wanted, drawn, findings, units)
     return 0
 
 
-def _c_shell(args: argparse.Namespace) -> dict[str, Any]:
-    from ..exchange.drawn_networks import c_shell_data, read_network
+def _made(
+    args: argparse.Namespace, wanted: str, drawn: DrawnNetwork, units: Units | None
+) -> Imported:
+    from ..exchange.design_data import Rods
+    from ..exchange.imports import import_c_shell, import_grid
 
-    _require(args, "a C-shell", "opening", "section", "material")
-    curves = read_network(
-        args.file, args.layer, kind=args.curves, scale=args.scale, free_ends=args.free_ends
+    rods = Rods(_section(args), _material(args), units)
+    name = args.file.stem
+    if wanted == "c_shell":
+        return import_c_shell(drawn, name, rods, args.opening, args.out, args.target)
+    own = args.out.with_name(f"{args.out.stem}_surface.obj")
+    return import_grid(
+        drawn,
+        name,
+        rods,
+        args.out,
+        args.surface,
+        chart=args.chart,
+        held=args.held,
+        mesh_file=own,
     )
-    data = c_shell_data(
-        args.file.stem,
-        curves,
-        _section(args),
-        _material(args),
-        args.opening,
+
+
+def _reading(args: argparse.Namespace) -> ReadingOptions:
+    from ..exchange.cleaning import TOLERANCE
+    from ..exchange.drawn_networks import ReadingOptions
+
+    return ReadingOptions(
+        layers=args.layer,
+        kind=args.curves,
         free_ends=args.free_ends,
-    )
-    if args.target is not None:
-        data["target"] = {"file": _from_the_design(args, args.target)}
-    return _checked(args, data)
-
-
-def _grid(args: argparse.Namespace) -> dict[str, Any]:
-    from ..errors import InputError
-    from ..exchange.drawn_networks import grid_data, read_network
-
-    _require(args, "a grid", "surface", "section", "material")
-    if args.scale != 1.0 or args.free_ends:
-        raise InputError(
-            "not for grids",
-            source=args.file,
-            field="--free-ends" if args.free_ends else "--scale",
-            value=None if args.free_ends else args.scale,
-        )
-    curves = read_network(args.file, args.layer, kind=args.curves)
-    return _checked(
-        args,
-        grid_data(
-            args.file.stem,
-            curves,
-            _section(args),
-            _material(args),
-            _from_the_design(args, args.surface),
-            args.held,
-        ),
+        join=args.join,
+        tolerance=TOLERANCE if args.tolerance is None else args.tolerance,
     )
 
 
-def _from_the_design(args: argparse.Namespace, file: Path) -> str:
-    """A file's path, relative to the design's."""
-    return Path(os.path.relpath(file, args.out.parent)).as_posix()
+def _write(args: argparse.Namespace, made: Imported) -> None:
+    from ..exchange.polygons import write_surface
+    from ..files.files import check_output_file
+    from ..files.json_files import write_json
+
+    for path in made.meshes:
+        check_output_file(path, overwrite=args.overwrite)
+    for path, (vertices, faces) in made.meshes.items():
+        write_surface(path, vertices, faces, overwrite=args.overwrite)
+    write_json(args.out, made.data, overwrite=args.overwrite)
 
 
-def _checked(args: argparse.Namespace, data: dict[str, Any]) -> dict[str, Any]:
-    """The content of a design's file. Raises InputError, naming the drawing, where no design can be
-    made of it."""
+def _save_preview(
+    args: argparse.Namespace,
+    drawn: DrawnNetwork,
+    findings: Sequence[Finding],
+    units: Units | None,
+    refused: str | None = None,
+) -> None:
+    from ..exchange.import_summary import import_figures, import_rows
+    from ..report.import_preview import net_preview
+
+    figures = import_figures(drawn, units)
+    rows = import_rows(figures, list(findings), units, args.opening)
+    page = net_preview(args.file.name, drawn, rows, findings, units, refused)
+    page.save(args.preview, overwrite=args.overwrite)
+
+
+def _tell(
+    args: argparse.Namespace,
+    wanted: str,
+    drawn: DrawnNetwork,
+    findings: Sequence[Finding],
+    units: Units | None,
+) -> None:
+    """The summary of an import."""
+    from ..exchange.import_summary import import_figures, import_rows
+
+    figures = import_figures(drawn, units)
+    told = [{"kind": f.kind, "text": f.text, "places": f.places.tolist()} for f in findings]
+    data = {
+        "design": args.out,
+        "preview": args.preview,
+        "class": wanted,
+        "name": args.file.stem,
+        "summary": figures,
+        "findings": told,
+    }
+    opening = args.opening if wanted == "c_shell" else None
+    _report(args, data, import_rows(figures, list(findings), units, opening))
+
+
+def _report(
+    args: argparse.Namespace, data: dict[str, Any], rows: Sequence[tuple[str, str]]
+) -> None:
+    files = "".join(f"{path}\n" for path in (args.out, args.preview) if path is not None)
+    lines = "" if args.quiet else "".join(f"{name:<10} {text}\n" for name, text in rows)
+    report(args, data, files + lines)
+
+
+def _require(args: argparse.Namespace, wanted: str, *names: str) -> None:
     from ..errors import InputError
-    from ..structures.base import design_from_dict
 
-    try:
-        design_from_dict(data, str(args.out))
-    except InputError as error:
-        raise InputError(
-            error.message, source=args.file, field=error.field, value=error.value
-        ) from None
-    return data
-
-
-def _require(args: argparse.Namespace, what: str, *names: str) -> None:
-    from ..errors import InputError
-
+    what = {"c_shell": "a C-shell", "grid": "a grid"}[wanted]
     for name in names:
         if getattr(args, name) is None:
             raise InputError(f"{what} needs --{name}", source=args.file)
@@ -270,7 +377,49 @@ def _material(args: argparse.Namespace) -> dict[str, float]:
     return {name: value for name, value in given.items() if value is not None}
 
 
-def _umbrella(args: argparse.Namespace) -> dict[str, Any]:
+def _umbrella(args: argparse.Namespace) -> int:
+    from ..errors import InputError
+    from ..files.json_files import write_json
+    from ..structures.base import design_from_dict
+
+    data = _umbrella_data(args)
+    try:
+        design = design_from_dict(data, str(args.out or args.file))
+    except InputError as error:
+        raise InputError(
+            error.message, source=args.file, field=error.field, value=error.value
+        ) from None
+    if args.out is not None:
+        write_json(args.out, data, overwrite=args.overwrite)
+    lengths = design.parameters
+    figures = {
+        "cells": len(data["lengths"]),
+        "joints": len(design.joints),
+        "shortest_arm": float(lengths.min()),
+        "longest_arm": float(lengths.max()),
+        "units": data["units"],
+    }
+    unit = data["units"]["length"]
+    rows = [
+        ("cells", str(figures["cells"])),
+        ("joints", f"{figures['joints']} X joints"),
+        ("arms", f"{lengths.min():.4g} to {lengths.max():.4g} {unit}"),
+        ("units", f"{unit}, {data['units']['force']}"),
+    ]
+    if "target" not in data:
+        rows.append(("look at", "no target surface: the deployed design itself is taken as one"))
+    if args.preview is not None:
+        from ..report.import_preview import umbrella_preview
+
+        page = umbrella_preview(args.file.name, data, rows)
+        page.save(args.preview, overwrite=args.overwrite)
+    told = {"design": args.out, "preview": args.preview, "class": "umbrella", "name": data["name"]}
+    _report(args, told | {"summary": figures}, rows)
+    return 0
+
+
+def _umbrella_data(args: argparse.Namespace) -> dict[str, Any]:
+    """The content of an umbrella mesh's design file."""
     from ..errors import InputError
     from ..files.json_files import read_json
     from ..structures.umbrella.importer import import_release
@@ -281,6 +430,10 @@ def _umbrella(args: argparse.Namespace) -> dict[str, Any]:
     if args.file.suffix.lower() not in (".json", ".gz"):
         raise InputError("an umbrella mesh on a surface needs --patch", source=args.file)
     data = read_json(args.file)
+    if isinstance(data, dict) and str(data.get("format", "")).startswith("kop_exudyn/"):
+        raise InputError(
+            "is a file of kop_exudyn already: use it as it is", source=args.file, field="format"
+        )
     if not is_release(data):
         raise InputError(
             "isn't a released umbrella mesh; of a surface, give --patch", source=args.file
@@ -298,7 +451,7 @@ def _umbrella_on_mesh(args: argparse.Namespace) -> dict[str, Any]:
             args.file.stem,
             args.file,
             args.patch,
-            scale=args.scale,
+            scale=1.0 if args.scale is None else args.scale,
             plate_edge=args.plate_edge,
             density=args.density,
             plate_model=args.plates,

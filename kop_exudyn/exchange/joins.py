@@ -204,13 +204,8 @@ class _Decision:
 
     def _decide_two(self, turn: float, a: int, b: int) -> None:
         differ = self._differ(a, b)
-        if self.ends[a][0] == self.ends[b][0] and turn > _LARGEST_TURN:
-            k, end = self.ends[a]
-            x = ", ".join(f"{value:.6g}" for value in self.curves[k].points[end])
-            raise InputError(
-                f"its ends meet at a corner at ({x}): no lath is hinged with itself; draw it as two",
-                field=self.curves[k].label,
-            )
+        if self.ends[a][0] == self.ends[b][0]:
+            differ = turn > _LARGEST_TURN
         if differ is None:
             differ = turn > _LARGEST_TURN
             self.unsure.append(self.ends[a])
@@ -227,6 +222,13 @@ class _Decision:
         self.families.relate(self.ends[a][0], self.ends[b][0], False)
 
     def _hinge(self, a: int, b: int) -> None:
+        if self.ends[a][0] == self.ends[b][0]:
+            k, end = self.ends[a]
+            x = ", ".join(f"{value:.6g}" for value in self.curves[k].points[end])
+            raise InputError(
+                f"its ends meet at a corner at ({x}): no lath is hinged with itself; draw two",
+                field=self.curves[k].label,
+            )
         self.families.relate(self.ends[a][0], self.ends[b][0], True)
 
     def _differ(self, a: int, b: int) -> bool | None:

@@ -67,3 +67,13 @@ def write_ply(
 ) -> Path:
     """Write rod solids. Raises InputError when the file exists or can't be written."""
     return write_bytes(path, ply_bytes(mesh, colours), overwrite=overwrite)
+
+
+def write_surface(
+    path: str | Path, vertices: np.ndarray, faces: np.ndarray, *, overwrite: bool = False
+) -> Path:
+    """Write a triangle mesh, vertices (V, 3) and faces (F, 3), as OBJ. Raises InputError when the
+    file exists or can't be written."""
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices, float).tolist()]
+    lines += [f"f {a} {b} {c}" for a, b, c in (np.asarray(faces, int) + 1).tolist()]
+    return write_text(path, "\n".join([*lines, ""]), overwrite=overwrite)

@@ -20,7 +20,7 @@ from scipy.sparse.linalg import spsolve
 from ..errors import InputError
 from .mesh_files import read_mesh
 from .surfaces import Surface
-from .triangles import TriangleSurface
+from .triangles import TriangleSurface, barycentric
 
 _DEGREE = 3
 _MIN_CELLS, _MAX_CELLS = 4, 40
@@ -70,6 +70,13 @@ class MeshSurface(Surface):
     def deviation(self) -> float:
         """Largest distance of the smooth surface from the mesh's vertices at equal parameters."""
         return float(np.linalg.norm(self.points(self.flat) - self.mesh.vertices, axis=1).max())
+
+    def parameters_of(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Parameters (n, 2) of the mesh's points nearest to points (n, 3), and their distances."""
+        found = self.mesh.closest(np.asarray(points, float))
+        weights = barycentric(found.points, self.mesh.vertices[self.mesh.faces[found.faces]])
+        flat = self.flat[self.mesh.faces[found.faces]]
+        return np.einsum("nk,nkc->nc", weights, flat), np.sqrt(found.squared_distances)
 
     def contains(self, uv: np.ndarray) -> np.ndarray:
         uv = np.asarray(uv, float)

@@ -125,7 +125,7 @@ class TriangleSurface:
         )
         if len(others):
             corners = self.vertices[self.faces[faces[others]]]
-            zero = np.abs(_barycentric(projected[others], corners)) < _ON_EDGE
+            zero = np.abs(barycentric(projected[others], corners)) < _ON_EDGE
             features[others] = np.array(
                 [Feature.FACE, Feature.EDGE, Feature.VERTEX, Feature.VERTEX]
             )[zero.sum(axis=1)]
@@ -138,7 +138,7 @@ class TriangleSurface:
         return features, edges
 
 
-def _barycentric(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
+def barycentric(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """(n, 3) barycentric coordinates of points (n, 3) in triangles with these corners (n, 3, 3)."""
     opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
     inward = points[:, None, :] - np.roll(corners, -1, axis=1)

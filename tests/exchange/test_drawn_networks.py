@@ -1,16 +1,17 @@
 """Networks from drawings: OBJ and DXF files, written by the test or by ezdxf."""
 
 import json
-import logging
 
 import ezdxf
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from kop_exudyn.cli import main
 from kop_exudyn.errors import InputError
-from kop_exudyn.exchange.curve_files import DrawnCurve, read_curves
-from kop_exudyn.exchange.drawn_networks import joined, network_curves, read_network
+from kop_exudyn.exchange.curve_files import read_drawing
+from kop_exudyn.exchange.drawing import Drawing, DrawnCurve
+from kop_exudyn.exchange.drawn_networks import ReadingOptions, drawn_network, read_network
 from kop_exudyn.io.designs import load_design
 
 GRID = """# three lines across two
@@ -62,7 +63,7 @@ def piece(*points) -> DrawnCurve:
 
 class TestObj:
     def test_polylines(self, obj):
-        curves = read_curves(obj)
+        curves = read_drawing(obj).curves
         assert [len(curve.points) for curve in curves] == [2, 2, 2, 3, 2]
         np.testing.assert_array_equal(curves[3].points[1], [1.1, 0.5, 5])
         np.testing.assert_array_equal(curves[4].points, [[2, -0.2, 5], [2, 1.2, 5]])
@@ -77,7 +78,7 @@ class TestObj:
     def test_a_polyline_that_comes_back_is_closed(self, tmp_path):
         path = tmp_path / "loop.obj"
         path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2 3 1\n")
-        (curve,) = read_curves(path)
+        (curve,) = read_drawing(path).curves
         assert curve.closed and len(curve.points) == 3
 
     @pytest.mark.parametrize(
@@ -100,16 +101,16 @@ class TestObj:
         path = tmp_path / "net.obj"
         path.write_text(text)
         with pytest.raises(InputError, match=message) as caught:
-            read_curves(path)
+            read_drawing(path)
         assert str(caught.value).startswith(str(path))
 
     def test_layers_are_of_dxf_files(self, obj):
         with pytest.raises(InputError, match="only DXF files have layers"):
-            read_curves(obj, ["0"])
+            read_drawing(obj, ["0"])
 
 
 class TestDxf:
-    def test_every_kind_of_curve(self, drawing, tmp_path, caplog):
+    def test_every_kind_of_curve(self, drawing, tmp_path):
         document, space = drawing
         space.add_line((0, 0, 1), (2, 0, 1))
         space.add_lwpolyline([(0, 1), (1, 2), (2, 1)], dxfattribs={"elevation": 1})
@@ -117,9 +118,9 @@ class TestDxf:
         space.add_spline([(0, 5, 1), (1, 6, 1), (2, 5, 1)])
         space.add_circle((1, 8, 1), 0.5)
         space.add_text("not a rod")
-        with caplog.at_level(logging.WARNING, "kop_exudyn"):
-            line, lw, poly, spline, circle = read_curves(saved(document, tmp_path / "net.dxf"))
-        assert "left out what is no curve: 1 TEXT" in caplog.text
+        read = read_drawing(saved(document, tmp_path / "net.dxf"))
+        line, lw, poly, spline, circle = read.curves
+        assert read.skipped == ["no curves: 1 TEXT"]
         np.testing.assert_allclose(line.points, [[0, 0, 1], [2, 0, 1]])
         np.testing.assert_allclose(lw.points, [[0, 1, 1], [1, 2, 1], [2, 1, 1]])
         np.testing.assert_allclose(poly.points, [[0, 3, 1], [1, 3, 1], [2, 4, 1]])
@@ -134,7 +135,7 @@ class TestDxf:
     def test_bulges_are_arcs(self, drawing, tmp_path):
         document, space = drawing
         space.add_lwpolyline([(0, 0, 0, 0, 1), (2, 0)])  # a half circle below
-        (curve,) = read_curves(saved(document, tmp_path / "net.dxf"))
+        (curve,) = read_drawing(saved(document, tmp_path / "net.dxf")).curves
         np.testing.assert_allclose(np.linalg.norm(curve.points - [1, 0, 0], axis=1), 1, atol=1e-3)
 
     def test_layers(self, drawing, tmp_path):
@@ -143,11 +144,11 @@ class TestDxf:
             document.layers.add(name)
             space.add_line((0, 0), (1, 0), dxfattribs={"layer": name})
         path = saved(document, tmp_path / "net.dxf")
-        assert len(read_curves(path)) == 2 and len(read_curves(path, ["rods"])) == 1
+        assert len(read_drawing(path).curves) == 2 and len(read_drawing(path, ["rods"]).curves) == 1
         with pytest.raises(
             InputError, match=r"layer = 'rod': no such layer \(there are frame, rods\)"
         ):
-            read_curves(path, ["rod"])
+            read_drawing(path, ["rod"])
 
     def test_entities_of_other_programs_are_left_out(self, drawing, tmp_path):
         document, space = drawing
@@ -157,7 +158,7 @@ class TestDxf:
             b"ENTITIES\n", b"ENTITIES\n  0\nODD_THING\n  5\nFEFE\n", 1
         )
         path.write_bytes(content)
-        assert b"ODD_THING" in content and len(read_curves(path)) == 1
+        assert b"ODD_THING" in content and len(read_drawing(path).curves) == 1
 
     @pytest.mark.parametrize(
         "content, message",
@@ -171,33 +172,8 @@ class TestDxf:
         path = tmp_path / "net.dxf"
         path.write_bytes(content)
         with pytest.raises(InputError, match=message) as caught:
-            read_curves(path)
+            read_drawing(path)
         assert str(caught.value).startswith(str(path)) and "\n" not in str(caught.value)
-
-
-class TestJoining:
-    def test_edges_become_curves(self):
-        """Every edge of a net drawn for itself, in any order and direction."""
-        xs, ys = [0.0, 1.0, 2.1], [0.0, 0.9, 2.0]
-        edges = [piece((a, y), (b, y)) for y in ys for a, b in zip(xs, xs[1:])]
-        edges += [piece((x, b), (x, a)) for x in xs for a, b in zip(ys, ys[1:])]
-        edges = [edges[k] for k in np.random.default_rng(3).permutation(len(edges))]
-        found = joined(edges, 1e-6)
-        assert len(found) == 6 and {len(curve.points) for curve in found} == {3}
-        assert all(np.ptp(curve.points, axis=0).min() == 0 for curve in found)
-        assert not any(curve.closed for curve in found)
-
-    def test_sharp_corners_stay_joints(self):
-        assert len(joined([piece((0, 0), (1, 0)), piece((1, 0), (1, 1))], 1e-6)) == 2
-
-    def test_a_ring_of_pieces_is_closed(self):
-        corners = [(np.cos(t), np.sin(t)) for t in np.linspace(0, 2 * np.pi, 13)[:-1]]
-        (ring,) = joined([piece(a, b) for a, b in zip(corners, corners[1:] + corners[:1])], 1e-6)
-        assert ring.closed and len(ring.points) == 12
-
-    def test_the_straightest_continuation(self):
-        fan = [piece((0, 0), (1, 0)), piece((1, 0), (2, 0.1)), piece((1, 0), (2, 0.6))]
-        assert sorted(len(curve.points) for curve in joined(fan, 1e-6)) == [2, 3]
 
 
 class TestNetworks:
@@ -206,28 +182,49 @@ class TestNetworks:
             DrawnCurve(np.array([[0, 7, 0], [1, 7, 1], [2, 7, 0]], float), False, "a"),
             DrawnCurve(np.array([[0, 7, 0.5], [2, 7, 0.5]], float), False, "b"),
         ]
-        entries, labels = network_curves(curves, "polyline", 1000.0)
-        assert entries[0] == {"type": "polyline", "points": [[0, 0], [1000, 1000], [2000, 0]]}
-        assert labels == ["a", "b"] and network_curves(curves)[0][0]["type"] == "spline"
-        assert network_curves(curves)[0][1]["type"] == "polyline"
+        read = drawn_network(Drawing(curves), ReadingOptions(kind="polyline", scale=1000.0))
+        assert read.entries[0] == {
+            "type": "polyline",
+            "points": [[0, 0], [1000, 1000], [2000, 0]],
+        }
+        assert read.labels == ["a", "b"]
+        kinds = [entry["type"] for entry in drawn_network(Drawing(curves)).entries]
+        assert kinds == ["spline", "polyline"]
 
-    def test_drawings_in_space_are_refused(self):
-        with pytest.raises(
-            InputError, match="must lie in a plane parallel to the axes; they extend by 1, 1, 1"
-        ):
-            network_curves([DrawnCurve(np.array([[0, 0, 0], [1, 1, 1.0]]), False, "a")])
+    def test_c_shells_in_space_are_refused(self):
+        lines = np.array([[[0, 0, 0], [1, 1, 1]], [[0, 1, 0], [1, 0.2, 0.5]]], float)
+        curves = [DrawnCurve(line, False, "a") for line in lines]
+        with pytest.raises(InputError, match="must lie in a plane; they extend by 1, 1, 1"):
+            drawn_network(Drawing(curves))
+
+    def test_a_tilted_drawing_is_laid_flat(self):
+        """Lengths and angles are those of the drawing."""
+        turn = Rotation.from_rotvec([0.4, -0.8, 0.3])
+        square = [piece((-0.2, k), (2.2, k)) for k in range(3)]
+        square += [piece((k, -0.2), (k, 2.2)) for k in range(3)]
+        tilted = [
+            DrawnCurve(turn.apply(c.points) + [10.0, -4.0, 7.0], False, c.label) for c in square
+        ]
+        read = drawn_network(Drawing(tilted))
+        net, plain = read.network, drawn_network(Drawing(square)).network
+        assert net.n_joints == 9 and read.findings[0].text.startswith("the drawing's plane, turned")
+        for a, b in zip(net.strands, plain.strands):
+            np.testing.assert_allclose(a.lengths, b.lengths, rtol=1e-7)
+        np.testing.assert_allclose(net.opening_angles, np.pi / 2, atol=1e-7)
+        np.testing.assert_allclose(
+            read.frame.back(read.frame(tilted[2].points)), tilted[2].points, atol=1e-12
+        )
 
     def test_a_curve_without_joints_is_named_as_in_the_drawing(self, obj):
         obj.write_text(GRID + "v 8 8 5\nv 9 9 5\nl -2 -1\n")
-        with pytest.raises(InputError, match=r"net.obj: line 21\.points: crosses no other curve"):
-            read_network(obj)
+        with pytest.raises(InputError, match=r"line 21: crosses no other curve"):
+            read_network(obj).network
 
     def test_points_twice_are_dropped(self):
         doubled = DrawnCurve(np.array([[0, 0, 0], [0, 0, 0], [1, 0, 0]], float), False, "a")
-        assert network_curves([doubled, piece((0.5, -1), (0.5, 1))])[0][0]["points"] == [
-            [0, 0],
-            [1, 0],
-        ]
+        read = drawn_network(Drawing([doubled, piece((0.5, -1), (0.5, 1))]))
+        assert read.entries[0]["points"] == [[0, 0], [1, 0]]
+        assert [f.text for f in read.findings] == ["1 repeated points left out of a"]
 
 
 class TestCommand:
@@ -248,7 +245,8 @@ class TestCommand:
             )
             == 0
         )
-        assert capsys.readouterr().out == f"{out}\n"
+        told = capsys.readouterr().out.splitlines()
+        assert told[0] == str(out) and told[1].endswith("5 of 5 drawn pieces")
         design = load_design(out)
         assert design.name == "net" and design.network.n_joints == 6
         assert design.opening == pytest.approx(np.pi / 6)
@@ -273,6 +271,7 @@ class TestCommand:
 
     def test_dxf_to_design_with_json(self, drawing, tmp_path, capsys):
         document, space = drawing
+        document.units = ezdxf.units.MM
         for y in (0, 1000):
             space.add_line((-200, y), (2200, y))
         for x in (0, 1000, 2000):
@@ -282,11 +281,13 @@ class TestCommand:
             main(["import", str(path), "--out", str(out), *OPTIONS, "--scale", "0.001", "--json"])
             == 0
         )
-        assert json.loads(capsys.readouterr().out) == {
-            "design": str(out),
-            "class": "c_shell",
-            "name": "net",
-        }
+        told = json.loads(capsys.readouterr().out)
+        assert told["design"] == str(out) and told["class"] == "c_shell" and told["name"] == "net"
+        assert told["summary"]["joints"] == 6 and told["summary"]["curves"] == 5
+        assert told["summary"]["units"] == {
+            "length": "m",
+            "force": "N",
+        }  # drawn in mm, ezdxf's unit
         design = load_design(out)
         assert design.network.n_joints == 6 and design.network.size < 3
 
@@ -376,10 +377,10 @@ class TestGrids:
     @pytest.mark.parametrize(
         "options, message",
         [
-            ((), "a grid needs --surface"),
-            (("--surface", "no.obj"), "a grid needs --section"),
+            ((), "a grid needs --section"),
+            (OPTIONS[2:], "a grid needs --surface"),
             (("--surface", "no.obj", *OPTIONS[2:]), "surface.file = "),
-            (("--surface", "no.obj", *OPTIONS[2:], "--scale", "2"), "--scale = 2.0: not for grids"),
+            (("--surface", "no.ply", *OPTIONS[2:], "--scale", "2"), "surface.file = "),
         ],
     )
     def test_mistakes(self, options, message, plan, tmp_path, capsys):

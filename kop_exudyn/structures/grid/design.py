@@ -200,18 +200,22 @@ def _triangulated(
 def read_grid(data: Mapping[str, Any], source: str) -> Grid:
     """The grid of a design file's content (see grid.schema.json). Raises InputError."""
     try:
-        surface = _surface(data["surface"], source)
-        return Grid(
-            data["name"],
-            surface,
-            network_on(surface, data["network"]),
-            section_from_dict(data["section"], half_lap=True),
-            material_from_dict(data["material"]),
-            elements_per_piece=data.get("elements_per_piece", 2),
-            held=data.get("held"),
-        )
+        return grid_on(_surface(data["surface"], source), data)
     except InputError as error:
         raise error.at(source) from None
+
+
+def grid_on(surface: Surface, data: Mapping[str, Any]) -> Grid:
+    """The grid of a design file's content on a surface that is at hand. Raises InputError."""
+    return Grid(
+        data["name"],
+        surface,
+        network_on(surface, data["network"]),
+        section_from_dict(data["section"], half_lap=True),
+        material_from_dict(data["material"]),
+        elements_per_piece=data.get("elements_per_piece", 2),
+        held=data.get("held"),
+    )
 
 
 def _surface(data: Mapping[str, Any], source: str) -> Surface:

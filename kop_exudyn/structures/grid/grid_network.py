@@ -40,7 +40,7 @@ def network_on(surface: Surface, data: Mapping[str, Any]) -> CurveNetwork:
         inside = surface.contains(samples)
         if not inside.all():
             raise InputError(
-                "leaves the surface",
+                "leaves the surface: is it drawn in the surface's unit, and above it?",
                 field=curve.field,
                 value=samples[int(np.argmin(inside))].tolist(),
             )

@@ -31,6 +31,14 @@ def import_release(
     plate_model : "rods" as released, or "rigid"
     """
     released = release_mesh(data, source)
+    for field in ("base_mesh_v", "arm_joint_offset"):
+        if field not in data:
+            raise InputError(
+                "is missing in this released umbrella mesh, which can't be made a design file "
+                "without it; simulate the released file itself",
+                source=source,
+                field=field,
+            )
     unit = released.unit
     base = np.array(data["base_mesh_v"], float)[:, :2] * unit
     flips = data.get("flip_bits") or [False]

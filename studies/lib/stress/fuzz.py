@@ -30,6 +30,11 @@ from .limits import TimeOut, memory_limit, time_limit
 from .mutations import Tripwire, mutate
 
 
+def _network(path):
+    """A drawing, as far as `kop import` gets without knowing of rods."""
+    return read_network(path).network
+
+
 def _checkpoint(path: Path) -> SQPState:
     arrays = CheckpointStore(path.parent).load(path.stem)
     assert arrays is not None
@@ -46,7 +51,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "checkpoint": _checkpoint,
     "job": Job.load,
     "mesh": load_mesh_surface,
-    "drawing": read_network,
+    "drawing": _network,
     "study": load_study,
 }
 

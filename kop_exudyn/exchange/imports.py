@@ -1,0 +1,191 @@
+"""Drawings as designs: the files of the two classes that are made of drawn nets, with what a reader
+should know about each step."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..geometry.mesh_surface import MeshSurface, load_mesh_surface
+from ..structures.base import design_from_dict
+from ..units import LENGTHS, Units
+from .curve_files import read_drawing
+from .design_data import Rods, c_shell_data, grid_data, mesh_target, section_doubts
+from .drawing import Drawing, Finding
+from .drawn_networks import DrawnNetwork, ReadingOptions, drawn_network
+from .space_nets import surface_through, with_heights_checked
+
+_ON_SURFACE = 0.01  # of a mesh's size: curves drawn in space on it may be that far off
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A design made of a drawing.
+
+    data : the content of its file
+    drawn : what was understood of the drawing
+    findings : of reading and of making the design
+    meshes : files that the design names, and the vertices and faces to write there
+    """
+
+    data: dict[str, Any]
+    drawn: DrawnNetwork
+    findings: list[Finding]
+    meshes: dict[Path, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+
+
+def scaled_reading(
+    drawing: Drawing, options: ReadingOptions, scale: float | None, units: Units | None
+) -> tuple[ReadingOptions, Units | None]:
+    """The options with the scale that leads to the design's units, and these units.
+
+    scale : as asked for; None: from the drawing's unit to the design's, where both are known
+    units : as asked for; None: the drawing's, as far as the scale leads to a unit that is known
+    """
+    if units is not None and scale is None and drawing.metres is not None:
+        scale = drawing.metres / units.metres
+    scale = 1.0 if scale is None else scale
+    if units is None and drawing.metres is not None:
+        metres = drawing.metres / scale
+        near = [name for name, m in LENGTHS.items() if abs(metres / m - 1) < 1e-9]
+        units = Units(near[0]) if near else None
+    return replace(options, scale=scale), units
+
+
+def read_scaled(
+    path: Path,
+    options: ReadingOptions,
+    scale: float | None,
+    units: Units | None,
+    *,
+    space: bool = False,
+) -> tuple[DrawnNetwork, Units | None]:
+    """The network of a drawing in the design's units, see `scaled_reading` and `read_network`."""
+    drawing = read_drawing(path, options.layers)
+    options, units = scaled_reading(drawing, options, scale, units)
+    try:
+        return drawn_network(drawing, options, space=space), units
+    except InputError as error:
+        raise error.at(path) from None
+
+
+def import_c_shell(
+    drawn: DrawnNetwork, name: str, rods: Rods, opening: float, out: Path, target: Path | None
+) -> Imported:
+    """A C-shell of a flat net.
+
+    opening : rad
+    out : where the design will be written; target : mesh to keep to, in the drawing's coordinates
+
+    Raises InputError, naming the drawing's curves, where no design comes of it.
+    """
+    findings = drawn.findings + _doubts(drawn, rods)
+    goal = None
+    if target is not None:
+        goal = mesh_target(relative(target, out), drawn.frame, drawn.options.scale)
+    free = drawn.options.free_ends
+    data = c_shell_data(name, drawn.entries, rods, opening, free_ends=free, target=goal)
+    _check(drawn, data, out)
+    return Imported(data, drawn, findings)
+
+
+def import_grid(
+    drawn: DrawnNetwork,
+    name: str,
+    rods: Rods,
+    out: Path,
+    surface: Path | None,
+    *,
+    chart: str = "plane",
+    held: str | Sequence[int] | None = None,
+    mesh_file: Path | None = None,
+) -> Imported:
+    """A grid over a net: drawn in plan or in space, on a surface or on the net's own.
+
+    out : where the design will be written
+    surface : mesh file, in the drawing's coordinates; None: the surface through a net in space
+    chart : "plane": curves are taken in plan; "conformal": they are drawn in space on the surface
+    mesh_file : where the net's own surface will be written
+
+    Raises InputError, naming the drawing's curves, where no design comes of it.
+    """
+    scale, meshes = drawn.options.scale, {}
+    if surface is None:
+        if drawn.frame.flat:
+            raise InputError(
+                "a grid needs --surface: the net is drawn flat and says nothing of the shape"
+            )
+        assert mesh_file is not None
+        drawn = with_heights_checked(drawn)
+        vertices, faces, up = surface_through(drawn)
+        meshes[mesh_file] = (vertices, faces)
+        where: dict[str, Any] = {"type": "mesh", "file": relative(mesh_file, out), "up": up}
+        mesh = MeshSurface(vertices, faces, "plane", up)
+    else:
+        where = {"type": "mesh", "file": relative(surface, out)}
+        where |= {"scale": scale} if scale != 1.0 else {}
+        where |= {"chart": chart} if chart != "plane" else {}
+        mesh = load_mesh_surface(surface, chart, "z", scale)
+        if chart == "conformal":
+            drawn = replace(drawn, entries=_in_chart(drawn, mesh))
+    findings = drawn.findings + _doubts(drawn, rods)
+    data = grid_data(name, drawn.entries, rods, where, held)
+    _check(drawn, data, out, mesh if meshes else None)
+    return Imported(data, drawn, findings, meshes)
+
+
+def relative(file: Path, out: Path) -> str:
+    """A file's path as the design file at `out` names it."""
+    return Path(os.path.relpath(file, out.parent)).as_posix()
+
+
+def _doubts(drawn: DrawnNetwork, rods: Rods) -> list[Finding]:
+    """What looks like mixed units. Raises InputError for rods that are thicker than long."""
+    spans = np.concatenate([strand.lengths for strand in drawn.network.strands])
+    if not len(spans):
+        return []
+    doubts = section_doubts(rods, spans)
+    thickest = max(float(rods.section[side]) for side in ("width", "height"))
+    if thickest > float(np.median(spans)):
+        raise InputError(doubts[0], field="--section")
+    return [Finding("suspicious", text) for text in doubts]
+
+
+def _check(
+    drawn: DrawnNetwork, data: dict[str, Any], out: Path, mesh: MeshSurface | None = None
+) -> None:
+    """Raise InputError, in the drawing's words, where no design can be made of the content.
+
+    mesh : the surface, where its file isn't written yet
+    """
+    try:
+        if mesh is None:
+            design_from_dict(data, str(out))
+        else:
+            from ..structures.grid.design import grid_on
+
+            grid_on(mesh, data)
+    except InputError as error:
+        named = drawn.named(error)
+        raise InputError(named.message, field=named.field, value=named.value) from None
+
+
+def _in_chart(drawn: DrawnNetwork, mesh: MeshSurface) -> list[dict[str, Any]]:
+    """The curves in a chart's parameters, by the points of the mesh nearest to them."""
+    entries = []
+    for curve, entry in zip(drawn.curves, drawn.entries):
+        uv, apart = mesh.parameters_of(drawn.options.scale * curve.points)
+        if apart.max() > _ON_SURFACE * mesh.mesh.diagonal:
+            raise InputError(
+                f"is up to {apart.max():.3g} off the surface: with --chart conformal curves are "
+                "drawn in space on it, in its unit and place",
+                field=curve.label,
+            )
+        entries.append(entry | {"points": uv.tolist()})
+    return entries
