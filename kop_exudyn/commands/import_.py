@@ -148,7 +148,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--join",
         choices=("auto", "always", "never"),
         default="auto",
-        help="whether curves that meet end to end are one: where that keeps the two families apart, "
+        help="whether curves that meet end to end are one: where that keeps the families apart, "
         "where they turn by less than 45 degrees, or never (default: %(default)s)",
     )
     shell.add_argument(
