@@ -1,4 +1,5 @@
-"""The order of the package's folders: each knows only those before it."""
+"""The house: each folder knows only those before it, no modules import each other in a circle, and
+no module is without a caller."""
 
 import ast
 from collections.abc import Iterator
@@ -87,3 +88,68 @@ def test_an_import_from_a_later_folder_is_seen(tmp_path):
         ("report", 4),
         ("rods", 6),
     ]
+
+
+def modules_of(package: Path) -> dict[str, Path]:
+    """Modules by dotted name within the package; a folder stands for its __init__."""
+    found = {}
+    for file in package.rglob("*.py"):
+        parts = file.relative_to(package).with_suffix("").parts
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = file
+    return found
+
+
+def arrows(package: Path) -> dict[str, set[str]]:
+    """What each module imports of the package, anywhere in it."""
+    modules = modules_of(package)
+    found: dict[str, set[str]] = {name: set() for name in modules}
+    for name, file in modules.items():
+        own = name.split(".") if file.stem == "__init__" else name.split(".")[:-1]
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.ImportFrom):
+                continue
+            start = own[: len(own) - node.level + 1] if node.level else []
+            path = (node.module or "").split(".") if node.module else []
+            if not node.level:
+                if path[:1] != [package.name]:
+                    continue
+                path = path[1:]
+            target = ".".join([*start, *path]).strip(".")
+            for alias in node.names:
+                inner = f"{target}.{alias.name}".strip(".")
+                found[name].add(inner if inner in modules else target)
+        found[name] &= modules.keys()
+    return found
+
+
+def circles(graph: dict[str, set[str]]) -> list[list[str]]:
+    """Groups of modules that reach each other."""
+    reach = {name: set(targets) for name, targets in graph.items()}
+    changed = True
+    while changed:
+        changed = False
+        for own in reach.values():
+            more = set().union(own, *(reach[target] for target in own))
+            changed |= len(more) > len(own)
+            own |= more
+    looping = {name for name in graph if name in reach[name]}
+    groups = {
+        tuple(sorted(other for other in looping if other in reach[name] and name in reach[other]))
+        for name in looping
+    }
+    return sorted(list(group) for group in groups)
+
+
+def test_no_modules_import_each_other_in_a_circle(repository):
+    assert circles(arrows(repository / "kop_exudyn")) == []
+
+
+def test_a_circle_is_seen(tmp_path):
+    package = tmp_path / "toy"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "a.py").write_text("from .b import x\n")
+    (package / "b.py").write_text("def f():\n    from toy.c import y\n")
+    (package / "c.py").write_text("from . import a\n")
+    (package / "d.py").write_text("from .a import x\n")
+    assert circles(arrows(package)) == [["a", "b", "c"]]

@@ -10,7 +10,8 @@ from time import perf_counter
 import numpy as np
 import scipy.sparse as sp
 
-from ..scene.assembly import ENERGY, GRADIENT, HESSIAN, rod_assembly
+from ..scene.assembly import ENERGY, GRADIENT, HESSIAN
+from ..scene.assembly_choice import rod_assembly
 from ..scene.scene import Scene
 from ..scene.sparsity import sparsity_of
 from ..scene.state import State

@@ -1,0 +1,17 @@
+"""Which assembly a scene's rods get."""
+
+from __future__ import annotations
+
+from ..compiled.library import library
+from .assembly import RodAssembly
+from .assembly_compiled import CompiledAssembly
+from .assembly_numpy import NumpyAssembly
+from .scene import Scene
+from .sparsity import Sparsity
+
+
+def rod_assembly(scene: Scene, sparsity: Sparsity) -> RodAssembly:
+    """The rods of a scene, compiled where there are kernels."""
+    if library() is None:
+        return NumpyAssembly(scene, sparsity)
+    return CompiledAssembly(scene, sparsity)
