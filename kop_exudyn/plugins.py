@@ -25,16 +25,17 @@ class Registry(Generic[T]):
     """Things by name.
 
     package : whose modules register what comes with this package
+    what : what is registered, where a folder registers several sorts of things
     items : what was registered so far
     """
 
     _all: dict[str, Registry[Any]] = {}
 
-    def __init__(self, package: str):
+    def __init__(self, package: str, what: str = ""):
         self.package = package
         self.items: dict[str, T] = {}
         self._loaded = False
-        Registry._all[package] = self
+        Registry._all[f"{package} {what}"] = self
 
     def add(self, name: str, item: T) -> None:
         """Make a thing known under a name."""

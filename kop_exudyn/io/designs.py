@@ -12,9 +12,7 @@ from ..errors import InputError
 from ..files.documents import check_envelope, check_range, check_schema, has_schema
 from ..files.files import reason_of
 from ..files.json_files import read_json
-from ..structures.base import Design, design_from_dict
-from ..structures.umbrella.design import Umbrella
-from ..structures.umbrella.release import is_release
+from ..structures.base import Design, design_from_dict, foreign_reader
 from ..units import common_units
 
 DESIGN_VERSION = 2
@@ -22,15 +20,15 @@ _SUFFIXES = (".json", ".json.gz")
 
 
 def load_design(path: str | Path) -> Design:
-    """The design that a file describes: our own format, or a released umbrella mesh.
+    """The design that a file describes: our own format, or one that a structure class knows.
 
     Raises InputError naming the file, the field and the value when anything is wrong with it.
     """
     data = read_json(path)
     check_range(data, source=path)
-    if is_release(data):
+    if (read := foreign_reader(data)) is not None:
         try:
-            return Umbrella.from_release(data, str(path))
+            return read(data, str(path))
         except InputError as error:
             raise error.at(path) from None
     check_envelope(data, "design", DESIGN_VERSION, source=path)

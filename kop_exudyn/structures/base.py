@@ -153,6 +153,40 @@ R = TypeVar("R", bound=Reader)
 CLASSES: Registry[Reader] = Registry(__package__)
 
 
+@dataclass(frozen=True)
+class ForeignFormat:
+    """Files of other programs that are designs as they are.
+
+    recognises : whether a file's content is of this format, perhaps damaged
+    read : makes the design of the content and the file's name
+    """
+
+    recognises: Callable[[Any], bool]
+    read: Reader
+
+
+FORMATS: Registry[ForeignFormat] = Registry(__package__, "formats")
+
+
+def register_format(name: str, recognises: Callable[[Any], bool], read: Reader) -> None:
+    """Make `load_design` know files of another program.
+
+    name : of the format
+    recognises, read : see `ForeignFormat`
+    """
+    FORMATS.add(name, ForeignFormat(recognises, read))
+
+
+def foreign_reader(data: Any) -> Reader | None:
+    """What reads a file's content that isn't in our own format; None where it is, or is nothing
+    that is known."""
+    for name in FORMATS.names():
+        found = FORMATS.get(name)
+        if found is not None and found.recognises(data):
+            return found.read
+    return None
+
+
 def register_class(class_name: str) -> Callable[[R], R]:
     """Decorator: the reader that makes a `Design` of a design file's content (a mapping) and its
     source name.

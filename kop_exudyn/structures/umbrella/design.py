@@ -14,12 +14,12 @@ from ...errors import InputError, SimulationFailure
 from ...kit.groups import ElementGroup
 from ...rods.sections import Material, material_from_dict
 from ...units import Units
-from ..base import Design, Role, Target, register_class
+from ..base import Design, Role, Target, register_class, register_format
 from .bodies import RODS, joint_bodies
 from .layout import BaseMesh, Plates, umbrella_mesh
 from .mesh import UmbrellaMesh, UmbrellaTarget
 from .pins import Pins, pins_from_dict
-from .release import release_mesh
+from .release import is_release, release_mesh
 
 if TYPE_CHECKING:
     from ...equilibrium.equilibria import Equilibrium
@@ -291,6 +291,9 @@ class Umbrella(Design):
         design = Umbrella(self.name, mesh, **(options | changes))
         design.loads = self.loads
         return design
+
+
+register_format("released umbrella mesh", is_release, Umbrella.from_release)
 
 
 @register_class("umbrella")
