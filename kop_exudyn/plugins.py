@@ -13,7 +13,7 @@ from __future__ import annotations
 import pkgutil
 from collections.abc import Iterator, Mapping
 from importlib import import_module
-from importlib.metadata import entry_points
+from importlib.util import find_spec
 from typing import Any, Generic, TypeVar
 
 ENTRY_POINTS = "kop_exudyn"
@@ -44,6 +44,8 @@ class Registry(Generic[T]):
     def get(self, name: Any) -> T | None:
         """The thing of that name, None where there is none."""
         if name not in self.items:
+            self._load_alone(name)
+        if name not in self.items:
             self._load()
         return self.items.get(name)
 
@@ -52,9 +54,19 @@ class Registry(Generic[T]):
         self._load()
         return sorted(self.items)
 
+    def _load_alone(self, name: Any) -> None:
+        """Import the module that is named like the thing, if there is one: all of them take
+        long."""
+        if isinstance(name, str) and name.isidentifier():
+            module = f"{self.package}.{name}"
+            if find_spec(module):
+                import_module(module)
+
     def _load(self) -> None:
         if self._loaded:
             return
+        from importlib.metadata import entry_points
+
         self._loaded = True
         for module in pkgutil.iter_modules(import_module(self.package).__path__):
             import_module(f"{self.package}.{module.name}")

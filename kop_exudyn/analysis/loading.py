@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from ..equilibrium.equilibria import Equilibrium
 from ..equilibrium.exudyn_model import Confirmation, ExudynModel
@@ -155,6 +154,8 @@ def _pinned_joints(design: Design) -> np.ndarray:
 
 def _outermost(x: np.ndarray, down: np.ndarray) -> np.ndarray:
     """The lower ones of the joints x (n, 3) that are outermost in plan, or all outermost ones."""
+    from scipy.spatial import ConvexHull, QhullError
+
     plan = np.linalg.svd(down[None])[2][1:]
     flat, height = x @ plan.T, -x @ down
     try:
@@ -170,6 +171,8 @@ def _outermost(x: np.ndarray, down: np.ndarray) -> np.ndarray:
 
 def _surround(points: np.ndarray, centre: np.ndarray) -> bool:
     """Whether the centre (2,) lies within the convex hull of points (k, 2)."""
+    from scipy.spatial import ConvexHull, QhullError
+
     try:
         sides = ConvexHull(points).equations
     except (QhullError, ValueError):

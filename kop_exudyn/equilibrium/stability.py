@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-import scipy.sparse.linalg as spla
 
 from .direction import bordered_solve, factorise_convex
 from .equilibria import Equilibrium
@@ -33,6 +32,8 @@ def softest_mode(system: System, equilibrium: Equilibrium | None = None) -> Soft
     """
     if equilibrium is not None:
         system.linearise(equilibrium.state, equilibrium.q)
+    import scipy.sparse.linalg as spla
+
     shift, border = factorise_convex(system)
     n, metric = system.n_unknowns, system.metric
     # work in the scaled unknowns M^1/2 v, where the problem is a standard one

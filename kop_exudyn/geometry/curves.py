@@ -66,6 +66,14 @@ class Curve(ABC):
         inside, laps = self._inside(s)
         return self._evaluate(inside.ravel())[1].reshape(s.shape) + laps * self.lap_turning
 
+    def pose(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """`position` (n, 2) and `angle` (n,) at s (n,), for the price of one of them."""
+        inside, laps = self._inside(s)
+        x, angle, _ = self._evaluate(inside)
+        if not self.closed:
+            x = x + (s - inside)[:, None] * direction(angle)
+        return x, angle + laps * self.lap_turning
+
     def tangent(self, s: Any) -> np.ndarray:
         """Unit tangents (..., 2)."""
         return direction(self.angle(s))

@@ -14,8 +14,6 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.interpolate import BSpline
-from scipy.sparse.linalg import spsolve
 
 from ..errors import InputError
 from .mesh_files import read_mesh
@@ -101,6 +99,8 @@ class MeshSurface(Surface):
         """Penalised least squares through the vertices; the penalty leaves linear functions
         free."""
         extent = self.upper - self.lower
+        from scipy.sparse.linalg import spsolve
+
         cells = np.sqrt(len(flat) / _VERTICES_A_CELL * extent / extent[::-1])
         cells = np.clip(np.round(cells), _MIN_CELLS, _MAX_CELLS).astype(int)
         knots = [
@@ -153,14 +153,18 @@ def is_disc(mesh: TriangleSurface) -> bool:
     )
 
 
-def _basis(knots: np.ndarray, n: int) -> list[BSpline]:
+def _basis(knots: np.ndarray, n: int) -> list[Any]:
     """The n basis functions as one vector-valued spline, with its first two derivatives."""
+    from scipy.interpolate import BSpline
+
     spline = BSpline(knots, np.eye(n), _DEGREE)
     return [spline, spline.derivative(1), spline.derivative(2)]
 
 
 def _active(x: np.ndarray, knots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Numbers and values (n, degree + 1) of the basis functions that don't vanish at x (n,)."""
+    from scipy.interpolate import BSpline
+
     within = np.clip(x, knots[_DEGREE], knots[-_DEGREE - 1])  # round-off in the knots
     matrix = BSpline.design_matrix(within, knots, _DEGREE)
     return matrix.indices.reshape(len(x), -1).astype(int), matrix.data.reshape(len(x), -1)

@@ -12,10 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
 from ..geometry.triangles import Closest, TriangleSurface
+from ..rods.rotations import exp_so3
 from .base import Target
 
 _MAX_ITERATIONS = 100
@@ -38,7 +38,7 @@ class Placement:
 
     def moved(self, centre: np.ndarray, turn: np.ndarray, shift: np.ndarray) -> Placement:
         """This placement followed by a turn (rotation vector) about a point, and a shift."""
-        rotation = Rotation.from_rotvec(turn).as_matrix()
+        rotation = exp_so3(turn)
         return Placement(
             rotation @ self.rotation, rotation @ (self.translation - centre) + centre + shift
         )

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ..errors import InputError
 from ..geometry.mesh_files import read_mesh
@@ -49,6 +48,8 @@ def target_on_mesh(surface: TriangleSurface, joints: np.ndarray) -> Target:
     motions (Besl and McKay, IEEE PAMI 14, 1992). So the mesh has to lie and face about as the
     joints do; the target fitting of every later state looks for the best placement by itself.
     """
+    from scipy.spatial.transform import Rotation
+
     size, laid = float(np.linalg.norm(np.ptp(joints, axis=0))), joints
     for _ in range(_MAX_ITERATIONS):
         goal, before = surface.closest(laid).points, laid

@@ -19,8 +19,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CloughTocher2DInterpolator
-from scipy.spatial import Delaunay
 
 from ...equilibrium.equilibria import Equilibrium, Start
 from ...equilibrium.newton import NewtonOptions, solve
@@ -155,6 +153,9 @@ class CShell(Design):
         Lifted by the C1 Clough-Tocher interpolant of all rod nodes, it passes through every joint;
         the bare triangles between joints would have creases exactly where the joints are.
         """
+        from scipy.interpolate import CloughTocher2DInterpolator
+        from scipy.spatial import Delaunay
+
         state, flat = self.smooth_path[-1].state, self.layout.smooth[:, :2]
         if self.target_mesh is not None:
             return target_on_mesh(self.target_mesh, state.positions[self.joints])

@@ -55,12 +55,14 @@ class HalfPiece:
 
     strand : number of its curve; bodies (elements + 1,) : from one end to the other
     stations (elements + 1,) : arc lengths on the smooth curve
+    angles (elements + 1,) : the smooth curve's directions there, rad
     parameter : its length's place in q
     """
 
     strand: int
     bodies: np.ndarray
     stations: np.ndarray
+    angles: np.ndarray
     parameter: int
 
 
@@ -148,7 +150,7 @@ def shell_scene(
     ends = _EndNodes(build, layout, hinges, lift)
     if straight:
         ends.add_corners()
-    inner = build.nodes(bodies)
+    inner, stiffness = build.nodes(bodies), model.stiffness
     for piece in layout.pieces:
         nodes = [ends.node(piece, 0), *inner[piece.bodies[1:-1]], ends.node(piece, -1)]
         nodes = [int(inner[b] if n is None else n) for n, b in zip(nodes, piece.bodies)]
@@ -157,7 +159,7 @@ def shell_scene(
         first, last = (bool(body < network.n_joints) for body in piece.bodies[[0, -1]])
         build.rod(
             nodes,
-            model.stiffness,
+            stiffness,
             section=model.section,
             rest_strain=strain,
             cut=(first, last),
@@ -180,13 +182,15 @@ class _LayoutBuilder:
         self.smooth, self.straight = [flat], [flat.copy()]
         self.n_bodies = len(flat)
         self.pieces: list[HalfPiece] = []
+        self._stations: list[np.ndarray] = []  # of the bodies of the strand that is being added
+        self._drafts: list[tuple[np.ndarray, np.ndarray, int]] = []  # and of its pieces
         self.corners: list[tuple[int, int]] = []
 
     def add(self, number: int, straight: StraightStrand, numbers: StrandNumbers) -> None:
         strand = straight.strand
         for end, parameter in zip((0, -1), numbers.tips):
             if parameter is not None:
-                self._tip(number, straight, end, parameter)
+                self._tip(straight, end, parameter)
         for k, ((tail, head), (begin, end)) in enumerate(
             zip(strand.joints[strand.ends], strand.spans)
         ):
@@ -195,14 +199,24 @@ class _LayoutBuilder:
             a, b = self.network.joints[[tail, head]]
             middle = begin + l1 / (l1 + l2) * (end - begin)
             x = a + l1 * direction(angles[0]) if straight.exact[k] else 0.5 * (a + b)
-            body = self._bodies(strand, np.array([middle]), x[None], angles[0])[0]
+            body = self._bodies(np.array([middle]), x[None], angles[0])[0]
             self.corners.append((body, int(numbers.corners[k])))
-            self._piece(
-                number, strand, (tail, body), (begin, middle), (a, x), angles[0], numbers.before[k]
-            )
-            self._piece(
-                number, strand, (body, head), (middle, end), (x, b), angles[1], numbers.after[k]
-            )
+            self._piece((tail, body), (begin, middle), (a, x), angles[0], numbers.before[k])
+            self._piece((body, head), (middle, end), (x, b), angles[1], numbers.after[k])
+        self._evaluate(number, strand)
+
+    def _evaluate(self, number: int, strand: Strand) -> None:
+        """Ask the strand's curve about all its bodies and pieces at once."""
+        if not self._drafts:
+            return
+        n = sum(map(len, self._stations))
+        s = np.concatenate([*self._stations, *(stations for _, stations, _ in self._drafts)])
+        x, angle = strand.curve.pose(s)
+        self.smooth.append(np.concatenate([x[:n], angle[:n, None]], axis=1))
+        of_pieces = angle[n:].reshape(len(self._drafts), self.elements + 1)
+        for (bodies, stations, parameter), angles in zip(self._drafts, of_pieces):
+            self.pieces.append(HalfPiece(number, bodies, stations, angles, parameter))
+        self._stations, self._drafts = [], []
 
     def finish(self, straights: list[StraightStrand], numbering: Numbering) -> ShellLayout:
         network = self.network
@@ -230,35 +244,29 @@ class _LayoutBuilder:
             numbering,
         )
 
-    def _tip(self, number: int, straight: StraightStrand, end: int, parameter: int) -> None:
+    def _tip(self, straight: StraightStrand, end: int, parameter: int) -> None:
         """The free end before the first (0) or after the last (-1) joint."""
         strand = straight.strand
         length = strand.tail if end else strand.head
         joint, at, angle = strand.joints[end], strand.stations[end], straight.angles[end]
         x, far = self.network.joints[joint], at + length if end else at - length
         tip = x + (length if end else -length) * direction(angle)
-        body = self._bodies(strand, np.array([far]), tip[None], angle)[0]
+        body = self._bodies(np.array([far]), tip[None], angle)[0]
         if end:
-            self._piece(number, strand, (joint, body), (at, far), (x, tip), angle, parameter)
+            self._piece((joint, body), (at, far), (x, tip), angle, parameter)
         else:
-            self._piece(number, strand, (body, joint), (far, at), (tip, x), angle, parameter)
+            self._piece((body, joint), (far, at), (tip, x), angle, parameter)
 
-    def _piece(
-        self, number, strand: Strand, ends, stations, points, angle: float, parameter: int
-    ) -> None:
+    def _piece(self, ends, stations, points, angle: float, parameter: int) -> None:
         share = np.linspace(0, 1, self.elements + 1)
         s = stations[0] + share * (stations[1] - stations[0])
         x = points[0] + share[1:-1, None] * (points[1] - points[0])
-        inner = self._bodies(strand, s[1:-1], x, angle)
-        self.pieces.append(
-            HalfPiece(number, np.array([ends[0], *inner, ends[1]]), s, int(parameter))
-        )
+        inner = self._bodies(s[1:-1], x, angle)
+        self._drafts.append((np.array([ends[0], *inner, ends[1]]), s, int(parameter)))
 
-    def _bodies(self, strand: Strand, s: np.ndarray, x: np.ndarray, angle: float) -> np.ndarray:
+    def _bodies(self, s: np.ndarray, x: np.ndarray, angle: float) -> np.ndarray:
         """Bodies at arc lengths s of the smooth curve and at x (n, 2) of a straight piece."""
-        self.smooth.append(
-            np.concatenate([strand.curve.position(s), strand.curve.angle(s)[:, None]], axis=1)
-        )
+        self._stations.append(s)
         self.straight.append(np.concatenate([x, np.full((len(s), 1), angle)], axis=1))
         self.n_bodies += len(s)
         return np.arange(self.n_bodies - len(s), self.n_bodies)
@@ -320,8 +328,7 @@ def _rest_strain(
     unstressed."""
     strain = np.zeros((len(piece.bodies) - 1, 6))
     poses = (layout.straight if straight else layout.smooth)[piece.bodies]
-    strand = layout.network.strands[piece.strand]
-    angles = strand.curve.angle(piece.stations)
+    angles = piece.angles
     if straight:
         strain[:, 0] = 1.0
     else:

@@ -21,7 +21,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import cumulative_simpson
 
 from ...errors import InputError
 from ...geometry.network import CurveNetwork, Strand
@@ -98,6 +97,8 @@ def straighten_on(surface: Surface, network: CurveNetwork) -> Lamellas:
 
 def _spans(surface: Surface, strand: Strand) -> Spans:
     lengths, directions = _developed(surface, strand)
+    from scipy.integrate import cumulative_simpson
+
     turns = directions[:, -1]
     worst = int(np.argmax(np.abs(turns)))
     if abs(turns[worst]) > _LARGEST_TURN:
@@ -119,6 +120,8 @@ def _spans(surface: Surface, strand: Strand) -> Spans:
 def _developed(surface: Surface, strand: Strand) -> tuple[np.ndarray, np.ndarray]:
     """Arc lengths and directions (n_spans, m) along the flat lamella between joints, both from
     0."""
+    from scipy.integrate import cumulative_simpson
+
     stations = np.linspace(strand.spans[:, 0], strand.spans[:, 1], _SAMPLES, axis=-1)
     along = strand.curve.tangent(stations).reshape(-1, 2)
     local = surface.at(strand.curve.position(stations).reshape(-1, 2))

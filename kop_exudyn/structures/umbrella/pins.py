@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ...errors import InputError
 from ...scene.scene import Driven, Scene
@@ -59,6 +58,8 @@ class Pins:
     def aligned(state: State, bodies: np.ndarray, positions: np.ndarray) -> State:
         """The state moved rigidly so that the bodies (m,) come as near to positions (m, 3) as they
         can."""
+        from scipy.spatial.transform import Rotation
+
         x = state.positions[bodies]
         turn, _ = Rotation.align_vectors(positions - positions.mean(axis=0), x - x.mean(axis=0))
         rotation = turn.as_matrix()
