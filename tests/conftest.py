@@ -92,6 +92,8 @@ def shell(name: str, stretch: float):
     across = [
         [[x, -0.9], [x * 1.1 + 0.02, 0], [x, 0.9 * stretch]] for x in (-0.8, 0.05, 0.7 * stretch)
     ]
+    # pieces then fit a sheet of 1000 x 600 mm
+    along, across = ((0.85 * np.array(curves)).tolist() for curves in (along, across))
     return design_from_dict(
         {
             "class": "c_shell",

@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
+import pytest
+
 from kop_exudyn.cli import main
+from kop_exudyn.io.datasets import load_designs
+from kop_exudyn.io.results import save_result, save_states
+from kop_exudyn.report.kit_drawings import final_states
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings, StageSettings
 
 
 def test_a_folder_without_a_result_is_named(tmp_path, repository, capsys):
@@ -20,3 +30,61 @@ def test_a_folder_without_a_result_is_named(tmp_path, repository, capsys):
     assert status == 2
     assert "result.json" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_a_design_alone_is_written_for_other_programs(tmp_path, repository, capsys):
+    design = str(repository / "models" / "small" / "01_sinh.json")
+    assert main(["export", design, "--out", str(tmp_path / "out"), "--json"]) == 0
+    files = {Path(name).name for name in json.loads(capsys.readouterr().out)["files"]}
+    assert files == {path.name for path in (tmp_path / "out").iterdir()}
+    assert {"small_sinh_deployed.glb", "small_sinh_rest.vtu", "small_sinh_rods.csv"} <= files
+
+
+@pytest.mark.parametrize(
+    "options, named",
+    [
+        (["--only", "workshop"], "--only"),
+        (["--stock", "2400,-1"], "positive numbers"),
+        (["--kerf", "-1"], "not below 0"),
+        (["--paper", "letter"], "letter"),
+    ],
+)
+def test_options_that_make_no_sense(options, named, tmp_path, repository, capsys):
+    design = str(repository / "models" / "small" / "01_sinh.json")
+    try:
+        status = main(["export", design, "--out", str(tmp_path / "out"), *options])
+    except SystemExit as stopped:
+        status = stopped.code
+    assert status == 2 and named in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_stops_a_kit_from_being_built_is_named_and_can_be_overruled(
+    tmp_path, repository, capsys
+):
+    """Two tiny designs with an elastic limit that their bending passes."""
+    designs = tmp_path / "designs"
+    designs.mkdir()
+    for name in ("01_sinh", "03_exp"):
+        data = json.loads((repository / "models" / "small" / f"{name}.json").read_text())
+        data["material"]["elastic_limit"] = 1e5
+        (designs / f"{name}.json").write_text(json.dumps(data))
+    run = tmp_path / "run"
+    stages = StageSettings(
+        schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2
+    )
+    result = optimize_kit(
+        load_designs(designs),
+        {"linear": 6, "angular": 3},
+        settings=JobSettings(jobs=1, baselines=False, stages=stages),
+    )
+    run.mkdir()
+    save_result(run / "result.json", result.to_dict())
+    save_states(run / "states.npz", final_states(result))
+    command = ["export", str(run), str(designs), "--out", str(tmp_path / "out"), "--unit", "m"]
+    assert main(command) == 2
+    error = capsys.readouterr().err
+    assert "of its elastic limit" in error and "--force" in error and "small" in error
+    assert not (tmp_path / "out").exists()
+    assert main([*command, "--force", "--only", "workshop", "--paper", "a4"]) == 0
+    assert (tmp_path / "out" / "workshop" / "workshop.pdf").exists()

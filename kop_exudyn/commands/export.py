@@ -3,34 +3,53 @@
 from __future__ import annotations
 
 import argparse
+import logging
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .output import add_json, report
-from .values import number_pair, positive_number
+from .values import not_negative_number, number_list, number_pair, positive_number
 
 if TYPE_CHECKING:
+    from ..fabrication.options import CutOptions
     from ..units import Units
 
-HELP = "write cut lists, cut sheets, assembly plans and 3D files of a finished kit"
-DESCRIPTION = """Reads the folder that `kop optimize` wrote, and writes two folders: workshop (cut
-list, bills and assembly plans as CSV; labelled assembly drawings as SVG and PDF; cut sheets and
-corner templates at true scale as SVG, and DXF with the extra [fab]) and desk (the assigned designs'
-states as OBJ centre lines, PLY and GLB solids, VTU with strains, stresses and utilisation, and
-tables as CSV)."""
+log = logging.getLogger(__name__)
+
+HELP = "write cut lists, cut sheets, assembly plans and 3D files of a finished kit, or of a design"
+DESCRIPTION = """Of a finished kit (the folder that `kop optimize` wrote, with the folder of its
+designs) it writes two folders. workshop: workshop.pdf to print (cut list, parts with dimensions,
+bars to saw, sheets, assembly step by step); the same as tables: cut list, material, fasteners,
+bars, and of every design its bill, assembly plan, steps and joints; assembly drawings as SVG; cut
+sheets and templates at true scale as SVG and DXF. desk: the states of the
+designs for other programs, and tables of the whole result.
+
+Of a design file it deploys the design, and writes its states, the one under its loads included, for
+other programs.
+
+A kit that can't be built is refused: a design that is stressed beyond its limit or opens into
+another state, a part that is too short for its holes. --force writes it anyway."""
 EXAMPLES = """examples:
   kop export out/kit models/conformals --out out/files
-  kop export out/kit study.toml --out out/files --sheet 2500,1250 --joint-hole 6
-  kop export out/kit designs --out out/files --unit mm --only workshop"""
+  kop export out/kit study.toml --out out/files --sheet 2500,1250 --stock 3000,4500 --kerf 3.2
+  kop export out/kit designs --out out/files --unit mm --only workshop --paper a4
+  kop export models/grids/01_dome.json --out out/dome"""
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("result", type=Path, metavar="RESULT", help="folder of a finished run")
+    parser.add_argument(
+        "what",
+        type=Path,
+        metavar="RESULT|DESIGN",
+        help="folder of a finished run, or a design file (.json or .json.gz)",
+    )
     parser.add_argument(
         "folder",
         type=Path,
+        nargs="?",
         metavar="FOLDER|STUDY",
-        help="folder of the designs that it was made from, or study file",
+        help="of a result: the folder of the designs that it was made from, or the study file",
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write to")
     parser.add_argument(
@@ -42,57 +61,116 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--only", choices=("workshop", "desk"), help="write one of the folders (default: both)"
     )
     parser.add_argument(
-        "--sheet",
-        type=number_pair,
-        metavar="WIDTH,HEIGHT",
-        help="of the material, in mm (default: 1000,600)",
-    )
-    parser.add_argument(
-        "--joint-hole",
-        type=positive_number,
-        metavar="MM",
-        help="diameter of the holes at joints (default: 4)",
-    )
-    parser.add_argument(
-        "--bolt-hole",
-        type=positive_number,
-        metavar="MM",
-        help="diameter of the holes of corner plates (default: 3)",
+        "--force", action="store_true", help="write files of a kit that can't be built, too"
     )
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
     add_json(parser)
+    shop = parser.add_argument_group("workshop", "all in millimetres, whatever the designs are in")
+    shop.add_argument(
+        "--sheet", type=number_pair, metavar="W,H", help="size of a sheet (default: 1000,600)"
+    )
+    shop.add_argument(
+        "--stock",
+        type=number_list,
+        metavar="L,L,...",
+        help="lengths of the bars that straight pieces are sawn from (default: 2400,4800)",
+    )
+    for option, kind, help in (
+        ("kerf", not_negative_number, "width of a saw cut, lost between pieces (default: 3)"),
+        ("gap", not_negative_number, "between pieces on a sheet (default: 5)"),
+        ("clearance", not_negative_number, "by which slots are wider than needed (default: 0.2)"),
+        ("joint-hole", positive_number, "diameter of the holes at joints (default: the section's "
+         "joint_hole, else 4)"),
+        ("bolt-hole", positive_number, "diameter of the holes of corner plates (default: 3)"),
+    ):  # fmt: skip
+        shop.add_argument(f"--{option}", type=kind, metavar="MM", help=help)
+    shop.add_argument(
+        "--no-corners",
+        action="store_true",
+        help="strips as long as their axes, without corner plates: corners are joined otherwise",
+    )
+    shop.add_argument(
+        "--tolerance",
+        type=number_pair,
+        metavar="MM,DEG",
+        help="how exactly lengths and angles should be cut (default: 0.5,0.5)",
+    )
+    shop.add_argument(
+        "--paper", choices=("a4", "a3"), default="a3", help="of workshop.pdf (default: %(default)s)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
-    from importlib.util import find_spec
+    done = _kit(args) if os.path.isdir(args.what) else _design(args)
+    report(args, {"folder": args.out, "files": done}, f"{len(done)} files in {args.out}\n")
+    return 0
 
-    from ..exchange.export import export_desk, export_workshop
-    from ..fabrication.assembly_drawing import save_assembly_drawings
-    from ..fabrication.options import CutOptions
+
+def _kit(args: argparse.Namespace) -> list[Path]:
+    from ..errors import InputError
+    from ..exchange.export import export_desk
+    from ..fabrication.blanks import Blanks
+    from ..fabrication.folder import export_workshop
+    from ..fabrication.options import Tolerances
     from ..fabrication.pieces import parts_list_of
+    from ..fabrication.readiness import obstacles, refuse
     from ..io.datasets import load_designs
     from ..io.saved_runs import load_run
 
-    given = {name: getattr(args, name) for name in ("sheet", "joint_hole", "bolt_hole")}
-    options = CutOptions(**{name: value for name, value in given.items() if value is not None})
-    result = load_run(args.result, load_designs(args.folder))
-    unit = _unit(args, result.units)
+    if args.folder is None:
+        raise InputError(
+            "of a result, give also the folder of the designs that it was made from",
+            source=args.what,
+            field="FOLDER",
+        )
+    options = _options(args)
+    tolerances = Tolerances(*args.tolerance) if args.tolerance else Tolerances()
+    result = load_run(args.what, load_designs(args.folder))
+    unit, parts = _unit(args, result.units), parts_list_of(result)
+    found = obstacles(result, Blanks(parts, unit, options) if args.only != "desk" else None)
+    if not args.force:
+        refuse(found)
+    for sentence in found:
+        log.warning("not fit to be built: %s", sentence)
     done: list[Path] = []
     if args.only != "desk":
-        sheets = ["svg"] + (["dxf"] if find_spec("ezdxf") else [])
         done += export_workshop(
-            parts_list_of(result),
+            parts,
             args.out / "workshop",
             unit,
             options=options,
-            formats=sheets,
+            tolerances=tolerances,
+            paper=args.paper,
+            title=f"Kit of {len(parts.designs)} designs: {args.what.resolve().name}",
+            force=args.force,
             overwrite=args.overwrite,
         )
-        done += save_assembly_drawings(result, args.out / "workshop", overwrite=args.overwrite)
     if args.only != "workshop":
         done += export_desk(result, args.out / "desk", overwrite=args.overwrite)
-    report(args, {"folder": args.out, "files": done}, f"{len(done)} files in {args.out}\n")
-    return 0
+    return done
+
+
+def _design(args: argparse.Namespace) -> list[Path]:
+    from ..analysis.simulation import simulate
+    from ..errors import InputError
+    from ..exchange.export import export_simulation
+    from ..io.designs import load_design
+
+    if args.folder is not None or args.only == "workshop":
+        raise InputError(
+            "a design alone has no parts to cut: find a kit first (kop optimize)",
+            source=args.what,
+            field="FOLDER" if args.folder is not None else "--only",
+        )
+    return export_simulation(simulate(load_design(args.what)), args.out, overwrite=args.overwrite)
+
+
+def _options(args: argparse.Namespace) -> CutOptions:
+    from ..fabrication.options import CutOptions
+
+    names = ("sheet", "stock", "kerf", "gap", "clearance", "joint_hole", "bolt_hole")
+    given = {name: value for name in names if (value := getattr(args, name)) is not None}
+    return CutOptions(**given, corners=not args.no_corners)
 
 
 def _unit(args: argparse.Namespace, units: Units | None) -> str:

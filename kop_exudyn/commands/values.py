@@ -51,6 +51,22 @@ def not_negative(text: str) -> int:
     return _whole(text, 0, "the value")
 
 
+def not_negative_number(text: str) -> float:
+    """A finite number that is not below 0."""
+    value = _numbers(text, (1,))
+    if not value or value[0] < 0:
+        raise argparse.ArgumentTypeError(f"expected a number not below 0, got {text!r}")
+    return value[0]
+
+
+def number_list(text: str) -> tuple[float, ...]:
+    """``2400,4800`` as (2400.0, 4800.0): one positive number or several."""
+    values = _numbers(text, tuple(range(1, 100)))
+    if not values or min(values) <= 0:
+        raise argparse.ArgumentTypeError(f"expected positive numbers, got {text!r}")
+    return tuple(values)
+
+
 def positive_number(text: str) -> float:
     """A finite number larger than 0."""
     value = _numbers(text, (1,))

@@ -1,81 +1,36 @@
-"""Folders of files for the workshop and for the desk."""
+"""The folder for the desk: states of designs for other programs, and tables of a whole result."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from functools import cache
+from collections.abc import Callable, Iterable, Sequence
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-
-from ..drawing.colours import kit_colours, to_linear
+from ..analysis.simulation import SimulationResult
 from ..errors import InputError
-from ..fabrication.assembly import write_assembly_plan
-from ..fabrication.blanks import Blanks
-from ..fabrication.cutlist import write_bill, write_cut_list
-from ..fabrication.cutsheets import cut_sheets, template_sheets
-from ..fabrication.dxf import write_dxf
-from ..fabrication.options import CutOptions, Tolerances
 from ..fabrication.pieces import PartsList, parts_list_of
-from ..fabrication.placement import PlacedPieces
-from ..fabrication.svg import write_svg
 from ..files.files import file_stem, make_folder
 from ..files.tables import write_csv
 from ..search.objective import Evaluation
 from ..search.result import KitResult
-from ..structures.strength import materials_of, rod_strength
-from .gltf import Solid, write_glb
-from .meshes import RodMesh, sweep
-from .polygons import write_obj, write_ply
-from .result_tables import result_tables
-from .vtk import element_fields, write_vtu
+from ..structures.base import Target
+from .compas_json import write_compas
+from .gltf import write_glb
+from .meshes import sweep
+from .polygons import write_mesh_obj, write_obj, write_ply
+from .result_tables import part_rows, result_tables, rod_rows
+from .rhino import write_rhino
+from .states import DesignState, states_of_kit, states_of_simulation
+from .vtk import write_vtu
 
-DESK_FORMATS = ("obj", "ply", "glb", "vtu", "csv")
-SHEET_FORMATS = {"svg": write_svg, "dxf": write_dxf}
-
-_GREY = np.array([0.62, 0.62, 0.62])  # rods that no part makes
+DESK_FORMATS = ("obj", "ply", "glb", "vtu", "csv", "3dm", "compas")
+_NEEDS = {"3dm": "rhino3dm", "compas": "compas"}  # what comes with extras
 
 
-def export_workshop(
-    parts: PartsList,
-    folder: str | Path,
-    unit: str,
-    *,
-    options: CutOptions = CutOptions(),
-    tolerances: Tolerances = Tolerances(),
-    formats: Iterable[str] = tuple(SHEET_FORMATS),
-    overwrite: bool = False,
-) -> list[Path]:
-    """Write the cut list, the bill of every design, assembly plans, cut sheets and templates;
-    returns their paths.
-
-    unit : the designs' unit of length
-    formats : of the sheets, "svg" and "dxf"
-
-    Raises InputError when a file exists already and `overwrite` is false, or for what can't be cut
-    (see `templates`).
-    """
-    writers = {name: _known(name, SHEET_FORMATS, "formats") for name in formats}
-    blanks = Blanks(parts, unit, options)
-    blanks.check()
-    sheets = {"cut_sheet": cut_sheets(blanks), "templates": template_sheets(blanks)}
-    folder = make_folder(folder)
-    done = [write_cut_list(folder / "cut_list.csv", blanks, tolerances, overwrite=overwrite)]
-    for design in parts.designs:
-        name, stem = design.design.name, file_stem(design.design.name)
-        done.append(write_bill(folder / f"bill_{stem}.csv", parts, [name], overwrite=overwrite))
-        done.append(
-            write_assembly_plan(
-                folder / f"assembly_{stem}.csv", parts, name, unit, overwrite=overwrite
-            )
-        )
-    for title, found in sheets.items():
-        for number, sheet in enumerate(found, 1):
-            done += [
-                write(folder / f"{title}_{number}.{suffix}", sheet, overwrite=overwrite)
-                for suffix, write in writers.items()
-            ]
-    return done
+def available_formats() -> tuple[str, ...]:
+    """The formats of `DESK_FORMATS` whose libraries are installed."""
+    return tuple(f for f in DESK_FORMATS if f not in _NEEDS or find_spec(_NEEDS[f]) is not None)
 
 
 def export_desk(
@@ -83,96 +38,126 @@ def export_desk(
     folder: str | Path,
     *,
     stage: str = "assigned",
-    formats: Iterable[str] = DESK_FORMATS,
+    formats: Iterable[str] | None = None,
     overwrite: bool = False,
 ) -> list[Path]:
     """Write every design's states after a stage, and tables of the whole result; returns their
     paths.
 
-    obj : centre lines; ply, glb : solids coloured by part; vtu : strains, stress resultants and
-        utilisation
+    Parameters
+    ----------
+    result : of a kit optimisation
+    folder : made where it isn't there
+    stage : "direct", "unrelaxed", "relaxed" or "assigned"
+    formats : of `DESK_FORMATS`; default: all whose libraries are installed. obj: centre lines in
+        groups named by part and element, and the target; ply: solids coloured by part; glb: solids
+        in metres, with the target; vtu: strains, stress resultants, utilisation and deviation; csv:
+        tables; 3dm: Rhino, layers by part; compas: graph and mesh for COMPAS 2
+    overwrite : whether files that exist are replaced
 
     Raises InputError when a file exists already and `overwrite` is false, or for a stage or format
     that isn't there.
     """
-    formats = [_known(name, dict(zip(DESK_FORMATS, DESK_FORMATS)), "formats") for name in formats]
+    formats = _checked(formats)
     outcomes = _known(stage, result.stages, "stage").designs
     folder, parts = make_folder(folder), parts_list_of(result)
     done = []
-    for placed, outcome in zip(parts.designs, outcomes):
+    for number, outcome in enumerate(outcomes):
         if isinstance(outcome, Evaluation):
-            for role, equilibrium in outcome.equilibria.items():
-                path = folder / f"{file_stem(placed.design.name)}_{stage}_{role}"
-                done += _write_state(
-                    parts, PlacedPieces.of(placed, role), equilibrium, path, formats, overwrite
-                )
+            target = result.references[number].target
+            states = list(states_of_kit(parts, number, outcome, target))
+            stem = f"{file_stem(result.designs[number].name)}_{stage}"
+            done += _write_states(states, target, folder, stem, formats, parts, overwrite)
     if "csv" in formats:
-        done += [
-            write_csv(folder / f"{name}.csv", rows, overwrite=overwrite)
-            for name, rows in result_tables(result).items()
-            if rows
-        ]
+        tables = result_tables(result) | {"parts": part_rows(parts)}
+        done += _write_tables(tables, folder, overwrite)
     return done
 
 
-def chain_colours(parts: PartsList, placed: PlacedPieces) -> np.ndarray:
-    """(n_chains, 3) sRGB of the parts that a scene's rod pieces are made of."""
-    colours = kit_colours(parts.kit.sizes)
-    return np.array(
-        [
-            _GREY if piece is None else colours[piece.kind][piece.part]
-            for piece in placed.chain_pieces
-        ]
-    )
+def export_simulation(
+    result: SimulationResult,
+    folder: str | Path,
+    *,
+    formats: Iterable[str] | None = None,
+    overwrite: bool = False,
+) -> list[Path]:
+    """Write a simulated design's states, the one under its loads included; returns their paths.
+
+    formats : as of `export_desk`
+
+    Raises InputError when a file exists already and `overwrite` is false, or for unknown formats.
+    """
+    formats, folder = _checked(formats), make_folder(folder)
+    states = list(states_of_simulation(result))
+    stem = file_stem(result.design.name)
+    done = _write_states(states, result.design.target, folder, stem, formats, None, overwrite)
+    if "csv" in formats:
+        rows = [row for state in states for row in rod_rows(state)]
+        done += _write_tables({f"{stem}_rods": rows}, folder, overwrite)
+    return done
 
 
-def _write_state(
-    parts: PartsList,
-    placed: PlacedPieces,
-    equilibrium,
-    path: Path,
-    formats: list[str],
+def _write_states(
+    states: Sequence[DesignState],
+    target: Target,
+    folder: Path,
+    stem: str,
+    formats: Sequence[str],
+    parts: PartsList | None,
     overwrite: bool,
 ) -> list[Path]:
-    scene, done = placed.scene, []
-    swept = cache(lambda: sweep(scene, equilibrium.state))  # for several formats, if for any
-    colours = chain_colours(parts, placed)
-    for suffix in formats:
-        target = path.with_name(f"{path.name}.{suffix}")
-        if suffix == "obj":
-            done.append(write_obj(target, scene.polylines(equilibrium.state), overwrite=overwrite))
-        elif suffix == "ply":
-            done.append(write_ply(target, swept(), colours[swept().chains], overwrite=overwrite))
-        elif suffix == "glb":
-            units = placed.design.units
-            solids = _solids(parts, placed, swept(), colours)
-            metres = 1.0 if units is None else units.metres
-            done.append(write_glb(target, solids, metres, overwrite=overwrite))
-        elif suffix == "vtu":
-            fields = element_fields(
-                scene, equilibrium, rod_strength(scene, equilibrium, materials_of(placed.design))
-            )
-            done.append(write_vtu(target, scene, equilibrium, fields, overwrite=overwrite))
+    """Files of one design's states: one each, or one for all of them where programs have layers."""
+    labels = () if parts is None else all_labels(parts)
+    writers: dict[str, Callable[[Path, DesignState], Path]] = {
+        "obj": lambda path, state: write_obj(path, state.lines, state.names, overwrite=overwrite),
+        "ply": lambda path, state: _write_ply(path, state, overwrite),
+        "vtu": lambda path, state: write_vtu(path, state, labels, overwrite=overwrite),
+        "glb": lambda path, state: write_glb(path, [state], overwrite=overwrite),
+        "compas": lambda path, state: write_compas(path, state, overwrite=overwrite),
+    }
+    endings = {"compas": "compas.json"}
+    done = [
+        writers[suffix](folder / f"{stem}_{state.name}.{endings.get(suffix, suffix)}", state)
+        for state in states
+        for suffix in formats
+        if suffix in writers
+    ]
+    if "3dm" in formats:
+        done.append(write_rhino(folder / f"{stem}.3dm", states, overwrite=overwrite))
+    if "obj" in formats:
+        path = folder / f"{stem}_target.obj"
+        done.append(write_mesh_obj(path, target.vertices, target.faces, overwrite=overwrite))
     return done
 
 
-def _solids(
-    parts: PartsList, placed: PlacedPieces, mesh: RodMesh, colours: np.ndarray
-) -> list[Solid]:
-    """One solid a part, named by its label: a layer each in programs that read GLB."""
-    labels = np.array(
-        ["other" if piece is None else parts.label(piece) for piece in placed.chain_pieces]
-    )
-    found = []
-    for label in dict.fromkeys(labels.tolist()):
-        faces = mesh.faces[(labels == label)[mesh.chains[mesh.faces[:, 0]]]]
-        used, numbers = np.unique(faces, return_inverse=True)
-        colour = to_linear(colours[mesh.chains[used[0]]])
-        found.append(Solid(label, mesh.vertices[used], numbers.reshape(-1, 3), colour))
-    return found
+def all_labels(parts: PartsList) -> tuple[str, ...]:
+    """Labels of all parts of all kinds: their numbers in VTU files are their places here, from
+    1."""
+    return tuple(label for labels in parts.labels.values() for label in labels)
 
 
-def _known(name: str, known, field: str):
+def _write_ply(path: Path, state: DesignState, overwrite: bool) -> Path:
+    mesh = sweep(state.scene, state.equilibrium.state)
+    placed = mesh.moved(state.placement.apply)
+    return write_ply(path, placed, state.colours[mesh.chains], overwrite=overwrite)
+
+
+def _write_tables(
+    tables: dict[str, list[dict[str, Any]]], folder: Path, overwrite: bool
+) -> list[Path]:
+    return [
+        write_csv(folder / f"{name}.csv", rows, overwrite=overwrite)
+        for name, rows in tables.items()
+        if rows
+    ]
+
+
+def _checked(formats: Iterable[str] | None) -> list[str]:
+    wanted = available_formats() if formats is None else formats
+    return [_known(name, dict(zip(DESK_FORMATS, DESK_FORMATS)), "formats") for name in wanted]
+
+
+def _known(name: str, known: Any, field: str) -> Any:
     if name not in known:
         raise InputError(f"unknown (there are {', '.join(known)})", field=field, value=name)
     return known[name]

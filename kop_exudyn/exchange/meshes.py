@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
+import shapely
 
 from ..errors import InputError
 from ..rods.rotations import bend_coefficients, exp_se3, log_so3
@@ -26,6 +27,10 @@ class RodMesh:
     faces: np.ndarray
     chains: np.ndarray
     elements: np.ndarray
+
+    def moved(self, motion: Callable[[np.ndarray], np.ndarray]) -> RodMesh:
+        """The mesh with its vertices moved."""
+        return replace(self, vertices=motion(self.vertices))
 
 
 def sweep(
@@ -65,7 +70,7 @@ def tube(n_rings: int, corners: np.ndarray) -> np.ndarray:
     sides = np.concatenate(
         [np.stack([start, step, step + k], axis=2), np.stack([start, step + k, start + k], axis=2)]
     )
-    cap = np.array(list(_ears(corners)))
+    cap = _caps(corners)
     return np.concatenate([cap[:, ::-1], sides.reshape(-1, 3), cap + k * (n_rings - 1)])
 
 
@@ -102,26 +107,12 @@ def _twists(x: np.ndarray, R: np.ndarray) -> np.ndarray:
     )
 
 
-def _ears(corners: np.ndarray) -> Iterator[tuple[int, int, int]]:
-    """Triangles of a simple counter-clockwise polygon (k, 2), by cutting off ears."""
-    left = list(range(len(corners)))
-    while len(left) > 3:
-        ear = next((n for n in range(len(left)) if _is_ear(corners, left, n)), 0)
-        yield left[ear - 1], left[ear], left[(ear + 1) % len(left)]
-        del left[ear]
-    yield left[0], left[1], left[2]
-
-
-def _is_ear(corners: np.ndarray, left: Sequence[int], n: int) -> bool:
-    a, b, c = (corners[left[k % len(left)]] for k in (n - 1, n, n + 1))
-    if _cross(b - a, c - b) <= 0:
-        return False
-    others = corners[
-        [k for k in left if k not in (left[n - 1], left[n], left[(n + 1) % len(left)])]
-    ]
-    inside = np.all([_cross(q - p, others - p) >= 0 for p, q in ((a, b), (b, c), (c, a))], axis=0)
-    return not inside.any()
-
-
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+def _caps(corners: np.ndarray) -> np.ndarray:
+    """(n, 3) triangles of a simple counter-clockwise polygon (k, 2)."""
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shapely.Polygon(corners)))
+    points = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
+    # shapely gives their places: which corners these are
+    numbers = np.linalg.norm(points[:, :, None] - corners, axis=3).argmin(axis=2)
+    a, b, c = (corners[numbers[:, k]] for k in range(3))
+    turn = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    return np.where(turn[:, None] > 0, numbers, numbers[:, ::-1])

@@ -35,6 +35,15 @@ def write_obj(
     return write_text(path, obj_polylines(polylines, names), overwrite=overwrite)
 
 
+def write_mesh_obj(
+    path: str | Path, vertices: np.ndarray, faces: np.ndarray, *, overwrite: bool = False
+) -> Path:
+    """Write a triangle mesh as OBJ. Raises InputError when the file exists or can't be written."""
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices, float).tolist()]
+    lines += [f"f {a} {b} {c}" for a, b, c in (np.asarray(faces) + 1).tolist()]
+    return write_text(path, "\n".join([*lines, ""]), overwrite=overwrite)
+
+
 def ply_bytes(mesh: RodMesh, colours: np.ndarray) -> bytes:
     """Rod solids as binary PLY: colours (V, 3) in [0, 1] by vertex, and the rod piece that each
     vertex belongs to."""

@@ -9,13 +9,15 @@ from typing import Any
 import numpy as np
 
 from ..equilibrium.equilibria import Equilibrium
-from ..fabrication.pieces import parts_list_of
+from ..fabrication.pieces import PartsList, parts_list_of
+from ..kit.kinds import part_kind
 from ..search.objective import Evaluation
 from ..search.result import INPUT, REDEPLOYED, STAGES, KitResult
 from ..structures.base import Design
 from ..structures.deviation import fit_summary
 from ..structures.strength import design_strength
-from .vtk import element_fields
+from .states import DesignState, states_of_kit
+from .vtk import state_fields
 
 Rows = list[dict[str, Any]]
 
@@ -152,17 +154,36 @@ def _joints(result: KitResult) -> Iterator[dict[str, Any]]:
 
 
 def _rods(result: KitResult) -> Iterator[dict[str, Any]]:
-    for design, outcome in zip(result.designs, result.stages["assigned"].designs):
-        if not isinstance(outcome, Evaluation):
-            continue
-        for role, strength in design_strength(design, outcome.equilibria).items():
-            fields = element_fields(design.scene(role), outcome.equilibria[role], strength)
-            for number, values in enumerate(zip(*fields.values())):
-                plain = {
-                    name: v.item() if isinstance(v, np.generic) else v
-                    for name, v in zip(fields, values)
-                }
-                yield {"design": design.name, "state": role, "rod_element": number} | plain
+    parts = parts_list_of(result)
+    for number, outcome in enumerate(result.stages["assigned"].designs):
+        if isinstance(outcome, Evaluation):
+            target = result.references[number].target
+            for state in states_of_kit(parts, number, outcome, target):
+                yield from rod_rows(state)
+
+
+def rod_rows(state: DesignState) -> Iterator[dict[str, Any]]:
+    """One row a rod element of a state: design, state, part, then `vtk.state_fields`."""
+    fields = state_fields(state)
+    for number, values in enumerate(zip(*fields.values())):
+        plain = {
+            name: v.item() if isinstance(v, np.generic) else v for name, v in zip(fields, values)
+        }
+        part = state.parts[plain["rod"]] if plain["rod"] >= 0 else ""
+        row = {"design": state.design.name, "state": state.name, "rod_element": number}
+        yield row | {"part": part or None} | plain
+
+
+def part_rows(parts: PartsList) -> Rows:
+    """One row a part: its number in VTU files, label, kind and parameters, in the designs'
+    units."""
+    rows: Rows = []
+    for kind, values in parts.kit.parts.items():
+        names = part_kind(kind).parameter_names
+        for label, value in zip(parts.labels[kind], values):
+            row = {"number": len(rows) + 1, "part": label, "kind": kind}
+            rows.append(row | dict(zip(names, map(float, value))))
+    return rows
 
 
 def _steps(result: KitResult) -> Iterator[dict[str, Any]]:

@@ -1,20 +1,20 @@
-"""States with strains, stress resultants and utilisation of every rod element, as VTU for ParaView
-and meshio."""
+"""States as VTU for ParaView and meshio: every rod element with its part, strains, stress
+resultants and utilisation, every point with its deviation."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import tempfile
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
+from typing import Any
 
 import numpy as np
 
 from ..equilibrium.equilibria import Equilibrium
-from ..files.files import write_text
+from ..files.files import write_bytes
 from ..scene.scene import Scene
 from ..structures.strength import Strength
+from .states import DesignState
 
-_LINE = 3  # VTK's cell type
 _RESULTANTS = ("N", "Qy", "Qz", "Mt", "My", "Mz")
 _STRAINS = ("stretch", "shear_y", "shear_z", "twist", "curvature_y", "curvature_z")
 
@@ -28,10 +28,7 @@ def element_fields(
     Strains are against the element's own rest shape, per rest length; local axes as in
     `rods.sections`.
     """
-    chain = np.full(len(scene.elements), -1)
-    for number, piece in enumerate(scene.chains):
-        chain[piece.elements] = number
-    fields = {"rod": chain, "rest_length": scene.rest_lengths(equilibrium.q)}
+    fields = {"rod": chain_of_element(scene), "rest_length": scene.rest_lengths(equilibrium.q)}
     strain = equilibrium.stress / scene.stiffness
     fields |= dict(zip(_STRAINS, strain.T)) | dict(zip(_RESULTANTS, equilibrium.stress.T))
     if strength is not None:
@@ -45,61 +42,62 @@ def element_fields(
     return fields
 
 
-def vtu_text(scene: Scene, equilibrium: Equilibrium, fields: Mapping[str, np.ndarray]) -> str:
-    """The scene's rods as line cells, with fields (E,) on them and the nodes' axes as vectors on
-    the points."""
-    x, R = scene.node_poses(equilibrium.state)
-    n, m = len(x), len(scene.elements)
-    axes = {name: R[:, :, k] for k, name in enumerate(("tangent", "section_y", "section_z"))}
-    return "\n".join(
-        [
-            '<?xml version="1.0"?>',
-            '<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian">',
-            "<UnstructuredGrid>",
-            f'<Piece NumberOfPoints="{n}" NumberOfCells="{m}">',
-            "<Points>",
-            _array("Points", x),
-            "</Points>",
-            "<Cells>",
-            _array("connectivity", scene.elements.ravel()),
-            _array("offsets", 2 * np.arange(1, m + 1)),
-            _array("types", np.full(m, _LINE), "UInt8"),
-            "</Cells>",
-            "<PointData>",
-            *(_array(name, values) for name, values in axes.items()),
-            "</PointData>",
-            "<CellData>",
-            *(_array(name, values) for name, values in fields.items()),
-            "</CellData>",
-            "</Piece>",
-            "</UnstructuredGrid>",
-            "</VTKFile>",
-            "",
-        ]
+def chain_of_element(scene: Scene) -> np.ndarray:
+    """(E,) the rod piece that every element belongs to, -1 without one."""
+    found = np.full(len(scene.elements), -1)
+    for number, piece in enumerate(scene.chains):
+        found[piece.elements] = number
+    return found
+
+
+def state_fields(state: DesignState) -> dict[str, np.ndarray]:
+    """`element_fields`, and of every rod element its element's number (0 without one) and its
+    largest deviation."""
+    rods = chain_of_element(state.scene)
+    fields = element_fields(state.scene, state.equilibrium, state.strength)
+    deviations = state.deviations[state.scene.elements]
+    return fields | {
+        "element": np.where(rods < 0, 0, state.elements[rods]),
+        "deviation": deviations.max(axis=1),
+    }
+
+
+def part_numbers(state: DesignState, labels: tuple[str, ...]) -> np.ndarray:
+    """(E,) place of every rod element's part among labels, from 1; 0 without a part."""
+    numbers = np.array([labels.index(part) + 1 if part in labels else 0 for part in state.parts])
+    rods = chain_of_element(state.scene)
+    return np.where(rods < 0, 0, numbers[rods])
+
+
+def vtu_mesh(state: DesignState, labels: tuple[str, ...] = ()) -> Any:
+    """The state as a `meshio.Mesh` of line cells.
+
+    labels : of the kit's parts; the field "part" has their places in it, from 1
+    """
+    import meshio
+
+    axes = {
+        name: state.axes[:, :, k] for k, name in enumerate(("tangent", "section_y", "section_z"))
+    }
+    fields = state_fields(state) | ({"part": part_numbers(state, labels)} if labels else {})
+    return meshio.Mesh(
+        state.points,
+        [("line", state.scene.elements)],
+        point_data=axes | {"deviation": state.deviations},
+        cell_data={name: [values] for name, values in fields.items()},
     )
 
 
 def write_vtu(
     path: str | Path,
-    scene: Scene,
-    equilibrium: Equilibrium,
-    fields: Mapping[str, np.ndarray],
+    state: DesignState,
+    labels: tuple[str, ...] = (),
     *,
     overwrite: bool = False,
 ) -> Path:
     """Write a state. Raises InputError when the file exists or can't be written."""
-    return write_text(path, vtu_text(scene, equilibrium, fields), overwrite=overwrite)
-
-
-def _array(name: str, values: np.ndarray, kind: str | None = None) -> str:
-    values = np.asarray(values)
-    integer = values.dtype.kind in "iu"
-    components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
-    numbers = " ".join(
-        map(repr, values.ravel().tolist() if integer else values.astype(float).ravel().tolist())
-    )
-    return (
-        f'<DataArray type="{kind or ("Int64" if integer else "Float64")}" '
-        f"Name={quoteattr(name)}{components} "
-        f'format="ascii">{numbers}</DataArray>'
-    )
+    with tempfile.TemporaryDirectory() as folder:
+        temporary = Path(folder) / "state.vtu"
+        vtu_mesh(state, labels).write(temporary)
+        content = temporary.read_bytes()
+    return write_bytes(path, content, overwrite=overwrite)

@@ -2,233 +2,384 @@
 
 Rods carry their part's label along the side that is the part's side 1, and the element's number of
 the assembly plan along the other one; corners carry their part's label, with "-" where they are
-built in flipped.
+built in flipped. Where lamellas cross, the upper one is drawn through. The scale is the smallest
+standard one at which no label covers another.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+import shapely
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from ..drawing.colours import kit_colours
+from ..drawing.labels import Label, place
 from ..drawing.style import FAINT, INK, QUIET, save_figure, style
 from ..files.files import file_stem, make_folder
 from ..kit.kinds import part_kind
 from ..scene.state import State
-from ..search.objective import Evaluation
-from ..search.result import KitResult
-from .pieces import PartsList, Piece, parts_list_of
+from .blanks import has_joint
+from .lamellas import UPPER, Lamellas
+from .options import millimetres
+from .paper import SCALES, Book, fitting_scale, scale_name
+from .pieces import PartsList, Piece
 from .placement import PlacedPieces
 
-_SIDE_ROOM = 0.42  # inches that the median side is long on paper: room for its label
-_LEAST, _MOST = 8.0, 45.0  # inches of the drawing's longer side
-_MARGIN = 0.6  # inches
-
-
-def save_assembly_drawings(
-    result: KitResult,
-    folder: str | Path,
-    *,
-    suffixes: Sequence[str] = ("svg", "pdf"),
-    overwrite: bool = False,
-) -> list[Path]:
-    """Write assembly_DESIGN.svg and .pdf for every design of a result; returns their paths.
-
-    Drawn in the assembled state where the design has one, as it is built from the kit; the input
-    design's state stands in where no equilibrium of the assigned design was found. Raises
-    InputError when a file can't be written.
-    """
-    parts, folder, done = parts_list_of(result), make_folder(folder), []
-    for design, reference, outcome in zip(
-        result.designs, result.references, result.stages["assigned"].designs
-    ):
-        role = next(
-            (role.name for role in design.roles if not role.fitted), design.fitted_role.name
-        )
-        found = outcome if isinstance(outcome, Evaluation) else reference
-        figure = draw_assembly(parts, design.name, found.equilibria[role].state, role)
-        done += save_figure(
-            figure, folder / f"assembly_{file_stem(design.name)}", suffixes, overwrite=overwrite
-        )
-    return done
+_SIDE_ROOM = 9.0  # mm that the median side is long on paper, at least: room for its label
+_BESIDE = 1.7  # mm from a rod's axis to the middle of the text beside it
+_GAP = 1.1  # mm on either side of a crossing in which the lower rod isn't drawn
+_ROD = 2.0  # points
+_OVERLAP = 12.0  # mm that neighbouring pages share
+_MARGIN = 12.0  # mm around the drawing on a sheet of its own
+_ALONG = (0.5, 0.36, 0.64, 0.24, 0.76)  # places of a label along its rod
+_AROUND = np.radians([45, 135, 225, 315, 0, 90, 180, 270])
 
 
 @dataclass(frozen=True)
-class _Sheet:
-    """Rods in the plane: their nodes (k, 2), joints (n, 2) and corners by parameter."""
+class AssemblyDrawing:
+    """A design laid out flat; lengths are millimetres of the thing.
 
+    parts, placed : what is drawn
+    lines : (k, 2) nodes of every rod piece
+    joints (n, 2) ; corners : places by parameter
+    """
+
+    parts: PartsList
+    placed: PlacedPieces
     lines: list[np.ndarray]
     joints: np.ndarray
     corners: dict[int, np.ndarray]
 
+    @property
+    def name(self) -> str:
+        return self.placed.design.name
 
-def draw_assembly(parts: PartsList, name: str, state: State, role: str) -> Figure:
-    """The drawing of one design.
+    @cached_property
+    def box(self) -> np.ndarray:
+        """(2, 2) lowest and highest x, y."""
+        points = np.concatenate(self.lines)
+        return np.stack([points.min(axis=0), points.max(axis=0)])
 
-    state, role : the state in which it is drawn, seen across its mean plane from the side to which
-        joint axes point: that of the flat assembly where the design has one, otherwise the deployed
-        one
+    @cached_property
+    def lamellas(self) -> Lamellas:
+        return Lamellas(self.placed)
+
+    @cached_property
+    def scale(self) -> float:
+        """The smallest standard drawing in which every label finds a free place."""
+        sides = [float(np.linalg.norm(line[-1] - line[0])) for line in self.lines]
+        fitting = [s for s in SCALES if np.median(sides) / s >= _SIDE_ROOM] or [SCALES[0]]
+        crowded: dict[float, int] = {}
+        for scale in reversed(fitting):
+            crowded[scale] = self.labels(scale)[2]
+            if not crowded[scale]:
+                return scale
+        return min(crowded, key=lambda scale: (crowded[scale], -scale))
+
+    def labels(self, scale: float) -> tuple[list[Label], list[np.ndarray], int]:
+        """All labels, their places on paper (mm, from the drawing's origin), and how many of them
+        cover another."""
+        found = [*self._joint_labels(scale), *self._lamella_labels(scale)]
+        for piece in self.placed.pieces.pieces:
+            found += self._piece_labels(piece, scale)
+        points = [*self.joints, *self.corners.values()]
+        dots = [shapely.Point(at / scale).buffer(0.6, quad_segs=2) for at in points]
+        rods = [shapely.LineString(line / scale) for line in self.lines]
+        return found, *place(found, dots, rods)
+
+    def _joint_labels(self, scale: float) -> Iterator[Label]:
+        for number, at in enumerate(self.joints / scale, 1):
+            places = [
+                at + r * np.array([np.cos(turn), np.sin(turn)])
+                for r in (2.2, 3.0, 4.0)
+                for turn in _AROUND
+            ]
+            yield Label(str(number), 4.5, np.array(places), colour=QUIET)
+
+    def _lamella_labels(self, scale: float) -> Iterator[Label]:
+        """The lamella's number beyond its first end."""
+        for lamella in self.lamellas.all:
+            line = self._of(lamella.straight[0])
+            if not line:
+                continue
+            first = line[0] / scale
+            out = first[0] - first[-1]
+            out = out / (np.linalg.norm(out) or 1.0)
+            across = np.array([-out[1], out[0]])
+            places = [first[0] + d * out + s * across for d in (5, 7, 9) for s in (0, 3, -3, 6, -6)]
+            yield Label(f"({lamella.number})", 7.0, np.array(places), weight="bold")
+
+    def _piece_labels(self, piece: Piece, scale: float) -> Iterator[Label]:
+        label, kind = self.parts.label(piece), part_kind(piece.kind)
+        if kind.angular:
+            yield from self._corner_label(piece, label, scale)
+            return
+        lines = self._of(piece)
+        if not has_joint(kind) or len(lines) != len(piece.parameters):
+            middle = np.mean([line.mean(axis=0) for line in lines], axis=0) / scale
+            around = [
+                middle + r * np.array([np.cos(turn), np.sin(turn)])
+                for r in (2.0, 4.0)
+                for turn in _AROUND
+            ]
+            turned = "m" if piece.variant == "mirrored" else ""
+            yield Label(f"{label}{turned}\n{piece.element}", 5.5, np.array([middle, *around]))
+            return
+        for line, column in zip(lines, piece.columns):
+            alone = len(lines) == 1
+            if column == 0 or alone:
+                side = "" if column == 0 else f"·{column + 1}"
+                yield self._beside(line / scale, label + side, 6.0, INK, "bold", 1)
+            if column or alone:
+                yield self._beside(line / scale, str(piece.element), 5.0, QUIET, "normal", -1)
+
+    def _corner_label(self, piece: Piece, label: str, scale: float) -> Iterator[Label]:
+        at = self.corners.get(piece.parameters[0])
+        if at is not None:
+            text = ("-" if piece.values[0] < 0 else "") + label
+            places = [
+                at / scale + r * np.array([np.cos(turn), np.sin(turn)])
+                for r in (2.2, 3.2, 4.5)
+                for turn in _AROUND[[5, 7, 0, 1, 2, 3, 4, 6]]
+            ]
+            yield Label(text, 5.0, np.array(places))
+
+    @staticmethod
+    def _beside(
+        line: np.ndarray, text: str, size: float, colour: str, weight: str, first: int
+    ) -> Label:
+        """Text along a rod, never upside down; `first`: the side that it would rather be on."""
+        step = line[-1] - line[0]
+        angle = (np.degrees(np.arctan2(step[1], step[0])) + 75) % 180 - 75
+        across = np.array([-np.sin(np.radians(angle)), np.cos(np.radians(angle))])
+        places = [
+            line[0] + t * step + side * d * across
+            for d in (_BESIDE, _BESIDE + 1.8)
+            for side in (first, -first)
+            for t in _ALONG
+        ]
+        return Label(text, size, np.array(places), float(angle), colour, weight)
+
+    def _of(self, piece: Piece) -> list[np.ndarray]:
+        """The rod pieces of a piece."""
+        return [
+            self.lines[chain]
+            for parameter in piece.parameters
+            for chain in self.placed.chains.get(parameter, ())
+        ]
+
+    def draw(self, ax: Axes, scale: float, origin: np.ndarray, window: np.ndarray | None) -> None:
+        """Draw on axes in mm of paper.
+
+        origin : where the drawing's (0, 0) lies on paper
+        window (2, 2) : outside of which nothing is drawn; None: everything, without labels
+        """
+        shades = kit_colours(self.parts.kit.sizes)
+        pieces = self.placed.chain_pieces
+        upper = [
+            piece is not None and self.lamellas.layer.get(piece.element) == UPPER
+            for piece in pieces
+        ]
+        clip = None if window is None else (*window[0], *(window[1] - window[0]))
+        for over in (False, True):
+            numbers = [k for k, above in enumerate(upper) if above == over]
+            lines = [origin + self.lines[k] / scale for k in numbers]
+            colours = [
+                FAINT if (piece := pieces[k]) is None else shades[piece.kind][piece.part]
+                for k in numbers
+            ]
+            if over and window is not None:
+                near = map(self._near_joints, numbers, lines)
+                gaps = [gap for of_rod in near for gap in of_rod]
+                _add(ax, gaps, "white", _ROD * 2.6, clip)
+            _add(ax, lines, colours, _ROD if window is not None else 0.8, clip)
+        if window is None:
+            return
+        joints = origin + self.joints / scale
+        inside = np.all((joints > window[0]) & (joints < window[1]), axis=1)
+        ax.plot(*joints[inside].T, ls="", marker="o", ms=1.6, color=INK, zorder=4)
+        corners = np.array([origin + at / scale for at in self.corners.values()]).reshape(-1, 2)
+        inside = np.all((corners > window[0]) & (corners < window[1]), axis=1)
+        ax.plot(*corners[inside].T, ls="", marker="D", ms=2.0, color=INK, zorder=4)
+        labels, places, _ = self._chosen
+        for label, at in zip(labels, places):
+            x, y = origin + at
+            if np.all(([x, y] > window[0] + 1) & ([x, y] < window[1] - 1)):
+                ax.text(
+                    x,
+                    y,
+                    label.text,
+                    size=label.size,
+                    rotation=label.angle,
+                    color=label.colour,
+                    weight=label.weight,
+                    ha="center",
+                    va="center" if "\n" in label.text else "center_baseline",
+                    rotation_mode="anchor",
+                    linespacing=1.15,
+                    zorder=5,
+                    parse_math=False,
+                )
+
+    def _near_joints(self, chain: int, line: np.ndarray) -> Iterator[np.ndarray]:
+        """The bits of a rod piece next to the joints that it ends at."""
+        for end, body in zip((0, -1), self.placed.ends[chain]):
+            if int(body) in self.placed.joint_numbers:
+                step = line[-1] - line[0]
+                step = step / (np.linalg.norm(step) or 1.0) * (1 if end == 0 else -1)
+                yield np.array([line[end], line[end] + _GAP * step])
+
+    @cached_property
+    def _chosen(self) -> tuple[list[Label], list[np.ndarray], int]:
+        return self.labels(self.scale)
+
+
+def _add(ax: Axes, lines: Sequence[np.ndarray], colours, width: float, clip) -> None:
+    from matplotlib.patches import Rectangle
+
+    collection = LineCollection(lines, colors=colours, linewidths=width, capstyle="butt")
+    ax.add_collection(collection, autolim=False)
+    if clip is not None:
+        collection.set_clip_path(Rectangle(clip[:2], *clip[2:], transform=ax.transData))
+
+
+def assembly_drawing(parts: PartsList, name: str, unit: str) -> AssemblyDrawing:
+    """The drawing of one design, as it is assembled.
+
+    Lamellas are drawn in the state in which they are put together: the flat one, where the design
+    has one, else the deployed one. Parts of other kinds are drawn where the design's geometry has
+    them before anything is opened. Seen across its mean plane, from the side to which joint axes
+    point; the longest extent lies across the paper.
+
+    unit : the designs' unit of length
     Raises InputError for a design that isn't there.
     """
-    parts.needed([name])
-    placed = PlacedPieces.of(next(d for d in parts.designs if d.design.name == name), role)
-    sheet = _flattened(placed, state)
-    size = _paper(sheet)
-    with style():
-        figure = Figure(figsize=size)
-        left, bottom = _MARGIN / size[0], _MARGIN / size[1]
-        ax = figure.add_axes((left, bottom, 1 - 2 * left, 1 - 2 * bottom))
-        ax.set_axis_off()
-        ax.set_aspect("equal")
-        _draw_rods(ax, parts, placed, sheet)
-        for piece in placed.pieces.pieces:
-            _label(ax, parts, placed, sheet, piece)
-        _draw_joints(ax, sheet)
-        figure.text(left, 1 - 0.35 / size[1], name, size=11, weight="bold", va="center")
-        figure.text(left, 0.3 / size[1], _explanation(placed), size=7.5, color=QUIET, va="center")
-    return figure
+    scale, number = millimetres(unit), parts.row_of(name)
+    pieces = parts.designs[number]
+    design = pieces.design
+    role = next((role.name for role in design.roles if not role.fitted), design.fitted_role.name)
+    placed = PlacedPieces.of(pieces, role)
+    flat = any(has_joint(part_kind(piece.kind)) for piece in pieces.pieces)
+    state = parts.states[number][role] if parts.states and flat else placed.scene.initial
+    return flattened(parts, placed, state, scale)
 
 
-def _flattened(placed: PlacedPieces, state: State) -> _Sheet:
-    """Projected along the direction in which the joints extend least; the longest extent lies
-    across the paper."""
+def flattened(
+    parts: PartsList, placed: PlacedPieces, state: State, scale: float = 1.0
+) -> AssemblyDrawing:
+    """A state projected along the direction in which the joints extend least.
+
+    scale : millimetres of the design's unit of length
+    """
     scene = placed.scene
     x, joints = scene.node_poses(state)[0], state.positions[placed.design.joints]
     centre = joints.mean(axis=0)
     right, _, normal = np.linalg.svd(joints - centre)[2]
     if normal @ state.rotations[placed.design.joints][:, :, 2].mean(axis=0) < 0:
         normal = -normal
-    axes = np.stack([right, np.cross(normal, right)], axis=1)
+    axes = scale * np.stack([right, np.cross(normal, right)], axis=1)
     flat = (x - centre) @ axes
-    return _Sheet(
+    return AssemblyDrawing(
+        parts,
+        placed,
         [flat[chain.nodes] for chain in scene.chains],
         (joints - centre) @ axes,
         {p: (state.positions[c.body] - centre) @ axes for p, c in placed.corners.items()},
     )
 
 
-def _paper(sheet: _Sheet) -> tuple[float, float]:
-    """Width and height in inches."""
-    sides = [np.linalg.norm(line[-1] - line[0]) for line in sheet.lines]
-    extent = np.ptp(np.concatenate(sheet.lines), axis=0)
-    scale = np.clip(_SIDE_ROOM / np.median(sides) * extent.max(), _LEAST, _MOST) / extent.max()
-    width, height = scale * extent + 2 * _MARGIN
-    return max(width, 5.0), max(height, 2.0)
-
-
-def _draw_rods(ax: Axes, parts: PartsList, placed: PlacedPieces, sheet: _Sheet) -> None:
-    shades = kit_colours(parts.kit.sizes)
-    colours = [
-        FAINT if piece is None else shades[piece.kind][piece.part] for piece in placed.chain_pieces
-    ]
-    ax.add_collection(LineCollection(sheet.lines, colors=colours, linewidths=2.2, capstyle="butt"))
-    ax.autoscale_view()
-
-
-def _draw_joints(ax: Axes, sheet: _Sheet) -> None:
-    ax.scatter(*sheet.joints.T, s=34, color="white", edgecolors=INK, linewidths=0.7, zorder=4)
-    for number, (x, y) in enumerate(sheet.joints, 1):
-        ax.text(x, y, str(number), size=3.6, ha="center", va="center", zorder=5)
-
-
-def _label(ax: Axes, parts: PartsList, placed: PlacedPieces, sheet: _Sheet, piece: Piece) -> None:
-    label, kind = parts.label(piece), part_kind(piece.kind)
-    if kind.angular:
-        if piece.parameters[0] in sheet.corners:
-            at, corner = sheet.corners[piece.parameters[0]], placed.corners[piece.parameters[0]]
-            ax.plot(*at, marker="D", ms=2.2, color=INK, zorder=4)
-            line = sheet.lines[(corner.before or corner.after)[0]]
-            ax.annotate(
-                ("-" if piece.values[0] < 0 else "") + label,
-                at,
-                5.5 * _beside(line)[1],
-                textcoords="offset points",
-                size=4.2,
-                ha="center",
-                va="center",
-                color=INK,
-            )
+def assembly_pages(book: Book, drawing: AssemblyDrawing) -> None:
+    """The drawing on pages: all of it first, then, where that is more than one page, its parts."""
+    scale = drawing.scale
+    page = book.page(f"Assembly of {drawing.name}", scale)
+    low, room = page.low + [0.0, 6.0], page.room - [0.0, 6.0]
+    size = np.ptp(drawing.box, axis=0)
+    if (size / scale <= room - 14.0).all():
+        origin = low + room / 2 - drawing.box.mean(axis=0) / scale
+        drawing.draw(page.ax, scale, origin, np.array([low, low + room]))
+        page.text(page.low[0], page.low[1], explanation(drawing.placed), 7, color=QUIET)
         return
-    chains = [chain for parameter in piece.parameters for chain in placed.chains.get(parameter, ())]
-    if placed.joint_of(piece) is None or len(chains) != len(piece.parameters):
-        middle = np.mean([sheet.lines[chain].mean(axis=0) for chain in chains], axis=0)
-        turned = " mirrored" if piece.variant == "mirrored" else ""
-        ax.text(
-            *middle,
-            f"{label}{turned}\n{piece.element}",
-            size=5.5,
-            ha="center",
-            va="center",
-            color=INK,
-        )
-        return
-    for chain, column in zip(chains, piece.columns):
-        if column == 0 or len(chains) == 1:
-            side = "" if column == 0 else f"·{column + 1}"
-            _along(ax, sheet.lines[chain], label + side, 5.2, INK, "bold")
-        if column or len(chains) == 1:
-            _along(
-                ax,
-                sheet.lines[chain],
-                str(piece.element),
-                4.2,
-                QUIET,
-                "normal",
-                below=len(chains) == 1,
-            )
+    inner = room - _OVERLAP
+    counts = np.maximum(np.ceil((size / scale + 14.0 - _OVERLAP) / inner), 1).astype(int)
+    page.scale = fitting_scale(size, room - 4.0)
+    page.heading += f": where its {counts.prod()} pages are"
+    origin = low + room / 2 - drawing.box.mean(axis=0) / page.scale
+    drawing.draw(page.ax, page.scale, origin, None)
+    page.text(page.low[0], page.low[1], explanation(drawing.placed), 7, color=QUIET)
+    corner = drawing.box.mean(axis=0) / scale - (counts * inner + _OVERLAP) / 2
+    for number in range(counts.prod()):
+        place_ = np.array([number % counts[0], counts[1] - 1 - number // counts[0]])
+        tile = corner + place_ * inner  # lower left, on paper at the drawing's scale
+        lower, upper = (origin + at * scale / page.scale for at in (tile, tile + room))
+        ring = np.array([lower, [upper[0], lower[1]], upper, [lower[0], upper[1]], lower])
+        page.line(ring, QUIET, 0.15)
+        x, y = (lower + upper) / 2
+        page.text(x, y, str(number + 1), 16, color=QUIET, ha="center", va="center", alpha=0.6)
+        one = book.page(f"Assembly of {drawing.name}, part {number + 1} of {counts.prod()}", scale)
+        drawing.draw(one.ax, scale, low - tile, np.array([low, low + room]))
+        note = f"{_OVERLAP:g} mm are shared with the next parts: {_neighbours(number, counts)}"
+        one.text(one.low[0], one.low[1], note, 7, color=QUIET)
 
 
-def _along(
-    ax: Axes,
-    line: np.ndarray,
-    text: str,
-    size: float,
-    colour: str,
-    weight: str,
-    below: bool = False,
-) -> None:
-    """Text beside a line's middle, along it, never upside down."""
-    angle, across = _beside(line)
-    across = (-4.5 if below else 4.5) * across
-    ax.annotate(
-        text,
-        (line[0] + line[-1]) / 2,
-        across,
-        textcoords="offset points",
-        size=size,
-        ha="center",
-        va="center",
-        rotation=angle,
-        rotation_mode="anchor",
-        color=colour,
-        weight=weight,
-    )
+def save_assembly_drawing(
+    drawing: AssemblyDrawing, folder: str | Path, *, overwrite: bool = False
+) -> list[Path]:
+    """Write assembly_DESIGN.svg, all of it on one sheet; returns its path.
+
+    Raises InputError when a file can't be written.
+    """
+    stem = make_folder(folder) / f"assembly_{file_stem(drawing.name)}"
+    return save_figure(draw_assembly(drawing), stem, ("svg",), overwrite=overwrite)
 
 
-def _beside(line: np.ndarray) -> tuple[float, np.ndarray]:
-    """Degrees at which text along a line can be read, upright lines all from the same side; unit
-    vector to above it."""
-    step = line[-1] - line[0]
-    angle = (np.degrees(np.arctan2(step[1], step[0])) + 75) % 180 - 75
-    return angle, np.array([-np.sin(np.radians(angle)), np.cos(np.radians(angle))])
+def draw_assembly(drawing: AssemblyDrawing) -> Figure:
+    """The whole drawing on one sheet of its own size."""
+    scale = drawing.scale
+    width, height = np.ptp(drawing.box, axis=0) / scale + 2 * _MARGIN
+    width, height = max(width, 130.0), height + 12.0
+    with style():
+        figure = Figure(figsize=(width / 25.4, height / 25.4))
+        ax = figure.add_axes((0, 0, 1, 1))
+        ax.set(xlim=(0, width), ylim=(0, height))
+        ax.set_axis_off()
+        origin = np.array([width / 2, height / 2]) - drawing.box.mean(axis=0) / scale
+        drawing.draw(ax, scale, origin, np.array([[0.0, 0.0], [width, height]]))
+        title = f"{drawing.name}, scale {scale_name(scale)}"
+        ax.text(_MARGIN, height - 6.0, title, size=11, weight="bold", va="center", parse_math=False)
+        ax.text(_MARGIN, 5.0, explanation(drawing.placed), size=6.5, color=QUIET, va="center")
+    return figure
 
 
-def _explanation(placed: PlacedPieces) -> str:
+def explanation(placed: PlacedPieces) -> str:
+    """What the labels mean."""
     kinds = {piece.kind for piece in placed.pieces.pieces}
     if any(placed.joint_of(piece) is not None for piece in placed.pieces.pieces):
         text = (
-            "bold: part, along its side 1 (·2: only its side 2 is used); grey: number of the "
-            "element in the "
-            "assembly plan; circles: joints"
+            "bold: part, along its side 1 (·2: only its side 2 is used) · grey: element, joint · "
+            "(n): lamella · drawn through: the upper lamella"
         )
     else:
-        text = "part, and below it the number of the element in the assembly plan; circles: joints"
-    return text + (
-        "; diamonds: corners, - for flipped" if any(part_kind(k).angular for k in kinds) else ""
-    )
+        text = (
+            "part (m: mirrored, top and bottom change places), below it the element · grey: joint"
+        )
+    angular = any(part_kind(kind).angular for kind in kinds)
+    return text + (" · diamonds: corners, - for flipped" if angular else "")
+
+
+def _neighbours(number: int, counts: np.ndarray) -> str:
+    """Which parts lie to the left, right, above and below a part."""
+    column, row = number % counts[0], number // counts[0]
+    sides = {"left": (-1, 0), "right": (1, 0), "above": (0, -1), "below": (0, 1)}
+    found = [
+        f"{side} {number + dx + dy * counts[0] + 1}"
+        for side, (dx, dy) in sides.items()
+        if 0 <= column + dx < counts[0] and 0 <= row + dy < counts[1]
+    ]
+    return ", ".join(found)

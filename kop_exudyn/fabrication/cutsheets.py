@@ -13,12 +13,11 @@ import numpy as np
 
 from ..errors import InputError
 from .blanks import Blanks
-from .options import CutOptions
+from .options import NOTE_ROOM, CutOptions
 from .shapes import NOTES, Polyline, Shape, Text, rectangle
 from .templates import Template, templates
 
 _NOTE_HEIGHT = 6.0  # mm
-_NOTE_ROOM = 24.0  # mm at the sheet's lower edge, for the notes and the scale bar under them
 _SCALE_BAR = 100.0  # mm, to check a print with
 _DIGITS = 6  # of a mm: sizes are packed as whole numbers of these
 
@@ -65,10 +64,9 @@ def lay_out(
 
     Raises InputError where a piece is larger than a sheet.
     """
-    width, height = (side - 2 * options.margin for side in options.sheet)
-    height -= _NOTE_ROOM
+    width, height = options.room
     for template in wanted:
-        size = _size(template)
+        size = template.size
         if size[0] > width or size[1] > height:
             raise InputError(
                 f"part {template.label} ({size[0]:.0f} x {size[1]:.0f} mm) is larger than a "
@@ -101,7 +99,7 @@ def _packed(
 
     packer = rectpack.newPacker(rotation=False, sort_algo=rectpack.SORT_LSIDE)
     for k, piece in enumerate(pieces):
-        packer.add_rect(*(whole(side + apart) for side in _size(piece)), rid=k)
+        packer.add_rect(*(whole(side + apart) for side in piece.size), rid=k)
     packer.add_bin(whole(width + apart) + 1, whole(height + apart) + 1, count=float("inf"))
     packer.pack()
     sheets: list[list[tuple[Template, float, float]]] = []
@@ -110,10 +108,6 @@ def _packed(
             sheets.append([])
         sheets[sheet].append((pieces[k], x / grid, y / grid))
     return sheets
-
-
-def _size(template: Template) -> np.ndarray:
-    return np.ptp(template.box, axis=0)
 
 
 def _sheet(
@@ -125,7 +119,7 @@ def _sheet(
     width, height = options.sheet
     shapes: list[Shape] = [rectangle(0.0, 0.0, width, height, NOTES)]
     labels: dict[str, int] = {}
-    corner = np.array([options.margin, options.margin + _NOTE_ROOM])
+    corner = np.array([options.margin, options.margin + NOTE_ROOM])
     for template, x, y in pieces:
         by = corner + [x, y] - template.box[0]
         shapes += [shape.moved(by) for shape in template.shapes]

@@ -1,5 +1,4 @@
-"""Cut sheets as DXF (AutoCAD 2010), in millimetres. Needs ezdxf, which comes with the extra
-"fab"."""
+"""Cut sheets as DXF (AutoCAD 2010), in millimetres."""
 
 from __future__ import annotations
 
@@ -9,7 +8,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
 from ..files.files import write_text
 from .cutsheets import Sheet
 from .shapes import CUT, ENGRAVE, NOTES, Hole, Polyline
@@ -18,7 +16,7 @@ _COLOURS = {CUT: 1, ENGRAVE: 5, NOTES: 8}  # AutoCAD's colour numbers: red, blue
 
 
 def dxf_text(sheet: Sheet) -> str:
-    """The sheet as DXF. Raises InputError without ezdxf."""
+    """The sheet as DXF."""
     ezdxf = load_ezdxf()
     with _without_dates(ezdxf.options):
         document = ezdxf.new("R2010", units=ezdxf.units.MM)
@@ -29,8 +27,7 @@ def dxf_text(sheet: Sheet) -> str:
 
 
 def write_dxf(path: str | Path, sheet: Sheet, *, overwrite: bool = False) -> Path:
-    """Write a sheet. Raises InputError when the file exists or can't be written, and without
-    ezdxf."""
+    """Write a sheet. Raises InputError when the file exists or can't be written."""
     return write_text(path, dxf_text(sheet), overwrite=overwrite)
 
 
@@ -63,13 +60,9 @@ def _without_dates(options: Any) -> Iterator[None]:
 
 
 def load_ezdxf() -> Any:
-    """The library. Raises InputError without it."""
-    try:
-        import ezdxf
-        import ezdxf.enums
-        import ezdxf.units
-    except ImportError:
-        raise InputError(
-            "DXF files need ezdxf: pip install 'kop_exudyn[fab]'", field="format", value="dxf"
-        ) from None
+    """The library, with all of it that is used here; it takes a while to load."""
+    import ezdxf
+    import ezdxf.enums
+    import ezdxf.units
+
     return ezdxf

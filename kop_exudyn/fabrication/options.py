@@ -8,18 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..units import LENGTHS
 
-# Millimetres of one unit of length.
-UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
+NOTE_ROOM = 24.0  # mm at a sheet's lower edge, for the notes and the scale bar under them
 
 
 def millimetres(unit: str) -> float:
     """Millimetres of one unit of length; InputError for a unit that isn't known."""
-    if unit not in UNITS:
+    if unit not in LENGTHS:
         raise InputError(
-            f"unknown unit of length (known: {', '.join(UNITS)})", field="unit", value=unit
+            f"unknown unit of length (known: {', '.join(LENGTHS)})", field="unit", value=unit
         )
-    return UNITS[unit]
+    return 1000 * LENGTHS[unit]
 
 
 @dataclass(frozen=True)
@@ -74,6 +74,12 @@ class CutOptions:
             )
         if not all(0 < length < np.inf for length in self.stock):
             raise InputError("a bar has a positive length", field="options.stock", value=self.stock)
+
+    @property
+    def room(self) -> tuple[float, float]:
+        """What a sheet has for pieces: its size without margins, and without its notes."""
+        width, height = (side - 2 * self.margin for side in self.sheet)
+        return width, height - NOTE_ROOM
 
     @property
     def apart(self) -> float:

@@ -21,6 +21,7 @@ from ..scene.state import State
 from ..search.objective import Evaluation
 from ..search.result import KitResult
 from ..structures.base import Design
+from ..structures.fitting import TargetFitting
 
 
 @dataclass(frozen=True)
@@ -167,15 +168,25 @@ def parts_list(
 def parts_list_of(result: KitResult) -> PartsList:
     """The pieces of a kit optimisation's final designs, in the states that they are built in.
 
-    The input design's states stand in where no equilibrium of the assigned design was found.
+    The deployed states lie where their joints fit the target best. The input design's states stand
+    in where no equilibrium of the assigned design was found.
     """
     parts = parts_list(result.kit, result.assignment, result.designs)
     found = [
         outcome if isinstance(outcome, Evaluation) else reference
         for outcome, reference in zip(result.stages["assigned"].designs, result.references)
     ]
-    states = tuple({role: eq.state for role, eq in each.equilibria.items()} for each in found)
-    return replace(parts, states=states)
+    states = []
+    for design, each in zip(result.designs, found):
+        of_roles = {role: eq.state for role, eq in each.equilibria.items()}
+        role = design.fitted_role.name
+        joints = of_roles[role].positions[design.joints]
+        fit = each.fit if isinstance(each, Evaluation) else TargetFitting(each.target)(joints)
+        of_roles[role] = of_roles[role].transformed(
+            fit.placement.rotation, fit.placement.translation
+        )
+        states.append(of_roles)
+    return replace(parts, states=tuple(states))
 
 
 def _pieces(

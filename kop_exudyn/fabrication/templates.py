@@ -33,6 +33,11 @@ class Template:
         """(2, 2) lowest and highest x, y."""
         return box_of(self.shapes)
 
+    @property
+    def size(self) -> np.ndarray:
+        """(2,) width and height."""
+        return np.ptp(self.box, axis=0)
+
 
 def templates(blanks: Blanks) -> list[Template]:
     """The shapes of all parts that a design needs: plates, strips, then plain bars.

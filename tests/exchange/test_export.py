@@ -4,11 +4,10 @@ import csv
 
 import numpy as np
 import pytest
-import trimesh
 
 from kop_exudyn.drawing.colours import part_colours, to_linear, to_srgb, value_colours
-from kop_exudyn.errors import InputError, SimulationFailure
-from kop_exudyn.exchange.export import export_desk, export_workshop
+from kop_exudyn.errors import SimulationFailure
+from kop_exudyn.exchange.export import export_desk
 from kop_exudyn.exchange.result_tables import result_tables
 from kop_exudyn.files.files import file_stem
 from kop_exudyn.files.tables import csv_text
@@ -31,48 +30,6 @@ def result(shells):
     return optimize_kit(
         shells, {"linear": 3, "angular": 2}, settings=settings, observer=events.append
     )
-
-
-def test_workshop_folder(parts, tmp_path):
-    files = export_workshop(parts, tmp_path / "workshop", "m")
-    names = {path.name for path in files}
-    assert {
-        "cut_list.csv",
-        "bill_first.csv",
-        "assembly_second.csv",
-        "cut_sheet_1.dxf",
-        "cut_sheet_1.svg",
-        "templates_1.svg",
-    } <= names
-    assert names == {path.name for path in (tmp_path / "workshop").iterdir()}
-    with pytest.raises(InputError, match="exists already"):
-        export_workshop(parts, tmp_path / "workshop", "m")
-    with pytest.raises(InputError, match="formats"):
-        export_workshop(parts, tmp_path / "other", "m", formats=["pdf"])
-
-
-def test_desk_folder(result, tmp_path):
-    files = export_desk(result, tmp_path / "desk")
-    assert {path.name for path in files} == {
-        *(
-            f"{name}_assigned_{role}.{suffix}"
-            for name in ("first", "second")
-            for role in ("deployed", "rest")
-            for suffix in ("obj", "ply", "glb", "vtu")
-        ),
-        "designs.csv",
-        "elements.csv",
-        "joints.csv",
-        "rods.csv",
-        "steps.csv",
-    }
-    scene = trimesh.load(tmp_path / "desk" / "first_assigned_deployed.glb")
-    assert set(scene.geometry) <= {"L1", "L2", "L3"}
-    q = result.stages["assigned"].designs[0].q
-    wanted = result.designs[0].scene("deployed").rest_lengths(q).sum() * 0.03 * 0.004
-    assert scene.to_geometry().volume == pytest.approx(wanted, rel=0.01)
-    with pytest.raises(InputError, match="stage"):
-        export_desk(result, tmp_path / "desk", stage="final")
 
 
 def test_tables(result):
@@ -112,6 +69,10 @@ def test_tables(result):
     np.testing.assert_array_equal(
         [float(r["Mz"]) for r in rods], final.designs[0].equilibria["deployed"].stress[:, 5]
     )
+    labels = {r["element"]: r["part"] for r in tables["elements"] if r["design"] == "first"}
+    assert all(r["part"] == labels[r["element"]] for r in rods)
+    fit = result.summary("assigned", 0)["fit"]
+    assert max(float(r["deviation"]) for r in rods) == pytest.approx(fit["pieces_max"])
 
 
 def test_designs_that_failed_are_in_the_tables_and_in_no_file(result, tmp_path):

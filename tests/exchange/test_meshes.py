@@ -6,14 +6,11 @@ import pytest
 import trimesh
 
 from kop_exudyn.errors import InputError
-from kop_exudyn.exchange.gltf import Solid, write_glb
 from kop_exudyn.exchange.meshes import sweep, tube
 from kop_exudyn.exchange.polygons import write_obj, write_ply
-from kop_exudyn.exchange.vtk import element_fields, write_vtu
 from kop_exudyn.rods.rotations import rotation_z
 from kop_exudyn.rods.sections import circle, general, rectangle
 from kop_exudyn.scene.builder import SceneBuilder
-from kop_exudyn.structures.strength import design_strength
 
 
 def rod(section, points, frames=None):
@@ -83,22 +80,6 @@ def test_rods_without_section_are_refused():
     assert len(sweep(scene, scene.initial, outline=rectangle(1, 1).outline).vertices) == 8
 
 
-def test_glb_read_by_trimesh(shells, deployed, tmp_path):
-    mesh = sweep(shells[0].scene("deployed"), deployed["deployed"].state)
-    path = write_glb(
-        tmp_path / "shell.glb",
-        [Solid("rods", mesh.vertices, mesh.faces, np.array([1.0, 0.5, 0.0]))],
-    )
-    scene = trimesh.load(path)
-    found = scene.to_geometry()
-    assert len(found.faces) == len(mesh.faces)
-    turned = mesh.vertices[:, [0, 2, 1]] * [1, 1, -1]  # z up to y up
-    np.testing.assert_allclose(found.bounds, [turned.min(axis=0), turned.max(axis=0)], atol=1e-6)
-    assert found.volume == pytest.approx(
-        trimesh.Trimesh(mesh.vertices, mesh.faces).volume, rel=1e-4
-    )
-
-
 def test_ply_read_by_trimesh_and_meshio(shells, deployed, tmp_path):
     mesh = sweep(shells[0].scene("rest"), deployed["rest"].state)
     colours = np.tile([1.0, 0.0, 0.2], (len(mesh.vertices), 1))
@@ -126,28 +107,3 @@ def test_obj_lines(shells, deployed, tmp_path):
         np.testing.assert_array_equal(a, b)
     named = write_obj(tmp_path / "named.obj", lines[:2], ["rod 1", "rod 2"]).read_text()
     assert "g rod_1\n" in named
-
-
-def test_vtu_read_by_meshio(shells, deployed, tmp_path):
-    scene, eq = shells[0].scene("deployed"), deployed["deployed"]
-    strength = design_strength(shells[0], deployed)["deployed"]
-    found = meshio.read(
-        write_vtu(tmp_path / "state.vtu", scene, eq, element_fields(scene, eq, strength))
-    )
-    np.testing.assert_array_equal(found.points, scene.node_poses(eq.state)[0])
-    np.testing.assert_array_equal(found.cells_dict["line"], scene.elements)
-    fields = {name: values[0] for name, values in found.cell_data.items()}
-    np.testing.assert_array_equal(fields["My"], eq.stress[:, 4])
-    np.testing.assert_array_equal(fields["utilisation"], strength.utilisation)
-    energy = 0.5 * np.sum(
-        fields["rest_length"]
-        * sum(
-            fields[s] * fields[r]
-            for s, r in zip(
-                ("stretch", "shear_y", "shear_z", "twist", "curvature_y", "curvature_z"),
-                ("N", "Qy", "Qz", "Mt", "My", "Mz"),
-            )
-        )
-    )
-    assert energy == pytest.approx(eq.elastic_energy, rel=1e-9)
-    np.testing.assert_allclose(np.linalg.norm(found.point_data["tangent"], axis=1), 1)

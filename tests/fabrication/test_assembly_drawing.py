@@ -4,10 +4,13 @@ from collections import Counter
 
 import numpy as np
 import pytest
+import shapely
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from kop_exudyn.drawing.style import figure_bytes
+from kop_exudyn.drawing.labels import Label, place
 from kop_exudyn.errors import InputError
-from kop_exudyn.fabrication.assembly_drawing import draw_assembly
+from kop_exudyn.fabrication.assembly_drawing import assembly_drawing, assembly_pages, draw_assembly
+from kop_exudyn.fabrication.paper import Book
 from kop_exudyn.fabrication.pieces import parts_list
 from kop_exudyn.kit.cluster import cluster
 from kop_exudyn.structures.base import design_from_dict
@@ -39,9 +42,12 @@ def parts(shell):
     return parts_list(found.kit, found.assignment, [shell])
 
 
+def texts_of(drawing):
+    return [text.get_text() for text in draw_assembly(drawing).axes[0].texts]
+
+
 def test_every_piece_and_joint_has_its_label(shell, parts):
-    figure = draw_assembly(parts, "shell", shell.scene("rest").initial, "rest")
-    texts = [text.get_text() for text in figure.axes[0].texts]
+    texts = texts_of(assembly_drawing(parts, "shell", "m"))
     labels = Counter(text.split("·")[0].lstrip("-") for text in texts)
     wanted = Counter(parts.label(piece) for piece in parts.designs[0].pieces)
     assert {label: labels[label] for label in wanted} == wanted
@@ -54,13 +60,12 @@ def test_every_piece_and_joint_has_its_label(shell, parts):
         piece.values[0] < 0 for piece in parts.designs[0].pieces if piece.kind == "angular"
     )
     assert sum(text.startswith("-") for text in texts) == flipped > 0
+    assert {f"({k})" for k in range(1, 6)} <= set(texts)  # lamellas
 
 
 def test_labels_stand_on_side_1(shell, parts):
     """The bold label lies beside the rod piece whose length is the part's l1."""
-    state = shell.scene("rest").initial
-    figure = draw_assembly(parts, "shell", state, "rest")
-    lines = figure.axes[0].collections[0].get_segments()
+    drawing = assembly_drawing(parts, "shell", "m")
     piece = next(p for p in parts.designs[0].pieces if p.kind == "linear" and len(p.columns) == 2)
     scene = shell.scene("rest")
     chain = next(
@@ -68,48 +73,100 @@ def test_labels_stand_on_side_1(shell, parts):
         for k, c in enumerate(scene.chains)
         if scene.length_parameter[c.elements[0]] == piece.parameters[piece.columns.index(0)]
     )
-    middle = (lines[chain][0] + lines[chain][-1]) / 2
-    bold = [
-        t
-        for t in figure.axes[0].texts
-        if t.get_weight() == "bold" and t.get_text() == parts.label(piece)
-    ]
-    assert min(np.linalg.norm(np.array(t.xy) - middle) for t in bold) < 1e-9
+    line = drawing.lines[chain] / drawing.scale
+    along = (line[-1] - line[0]) / np.linalg.norm(line[-1] - line[0])
+    labels, places, _ = drawing.labels(drawing.scale)
+    near = []
+    for label, at in zip(labels, places):
+        if label.weight == "bold" and label.text == parts.label(piece):
+            t, across = along @ (at - line[0]), np.array([-along[1], along[0]]) @ (at - line[0])
+            near.append(abs(across) if 0 < t < np.linalg.norm(line[-1] - line[0]) else np.inf)
+    assert min(near) < 4.0  # mm on paper
 
 
 def test_drawing_keeps_proportions_and_handedness(shell, parts):
-    """Seen from above: distances in the flat state are those of the design, counter-clockwise stays
-    so."""
-    x = shell.scene("rest").initial.positions[shell.joints][:, :2]
-    figure = draw_assembly(parts, "shell", shell.scene("rest").initial, "rest")
-    drawn = np.asarray(figure.axes[0].collections[1].get_offsets())
+    """Seen from above: distances in the flat state are those of the design in millimetres,
+    counter-clockwise stays so."""
+    x = 1000 * shell.scene("rest").initial.positions[shell.joints][:, :2]
+    drawn = assembly_drawing(parts, "shell", "m").joints
     step, wanted = drawn[1:3] - drawn[0], x[1:3] - x[0]
     np.testing.assert_allclose(
         np.linalg.norm(step, axis=1), np.linalg.norm(wanted, axis=1), rtol=1e-9
     )
     assert np.linalg.det(step) == pytest.approx(np.linalg.det(wanted))
-    assert len(figure_bytes(figure, "svg")) > 10_000
 
 
-def test_cells_are_labelled_in_their_middle():
+def lattice(across, down):
+    """An umbrella mesh over a parallelogram of triangles."""
     s = np.sqrt(3) / 2
-    design = design_from_dict(
+    points = [[40 * (i + j / 2), 40 * s * j] for j in range(down + 1) for i in range(across + 1)]
+    n = across + 1
+    faces = []
+    for j in range(down):
+        for i in range(across):
+            a = j * n + i
+            faces += [[a, a + 1, a + n], [a + 1, a + n + 1, a + n]]
+    lengths = [[32 + k % 5, 33 + k % 3] for k in range(len(faces))]
+    return design_from_dict(
         {
             "class": "umbrella",
-            "name": "pair",
-            "lengths": [[32, 33], [34, 35]],
-            "base": {
-                "vertices": [[0, 0], [40, 0], [20, 40 * s], [20, -40 * s]],
-                "faces": [[0, 1, 2], [0, 3, 1]],
-            },
+            "name": "lattice",
+            "lengths": lengths,
+            "base": {"vertices": points, "faces": faces},
         }
     )
-    found = cluster(design.groups, design.parameters, {"cell": 2})
+
+
+def drawn(figure):
+    """Boxes of all texts of a drawing, as the renderer measures them."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    renderer = canvas.get_renderer()
+    return [
+        shapely.box(*text.get_window_extent(renderer).extents)
+        for text in figure.axes[0].texts
+        if not text.get_rotation()
+    ]
+
+
+def test_labels_of_250_cells_do_not_overlap():
+    design = lattice(16, 8)
+    assert design.n_elements == 256
+    found = cluster(design.groups, design.parameters, {"cell": 8})
     parts = parts_list(found.kit, found.assignment, [design])
-    figure = draw_assembly(parts, "pair", design.scene().initial, "deployed")
-    assert sum(text.get_text().startswith("C") for text in figure.axes[0].texts) == 2
+    drawing = assembly_drawing(parts, "lattice", "mm")
+    texts = texts_of(drawing)
+    assert sum(text.startswith("C") for text in texts) == 256
+    assert sum(text.isdigit() for text in texts) == len(design.joints)
+    boxes = [box.buffer(-0.5) for box in drawn(draw_assembly(drawing))]
+    tree = shapely.STRtree(boxes)
+    pairs = tree.query(boxes, "intersects")
+    assert len(boxes) > 600 and (pairs[0] == pairs[1]).all()
+
+
+def test_a_large_drawing_is_split_into_pages_that_show_everything():
+    design = lattice(16, 8)
+    found = cluster(design.groups, design.parameters, {"cell": 8})
+    parts = parts_list(found.kit, found.assignment, [design])
+    book = Book("a4", "lattice")
+    assembly_pages(book, assembly_drawing(parts, "lattice", "mm"))
+    assert len(book.pages) > 3
+    first, *others = book.pages
+    assert {str(n) for n in range(1, len(others) + 1)} <= {t.get_text() for t in first.ax.texts}
+    shown = Counter(
+        text for page in others for text in {t.get_text() for t in page.ax.texts} if "\n" in text
+    )
+    assert len(shown) == 256
+
+
+def test_labels_that_find_no_place_are_counted():
+    crowd = [Label("100", 6.0, np.zeros((1, 2))) for _ in range(3)]
+    assert place(crowd)[1] == 2
+    apart = [Label("100", 6.0, np.array([[0.0, 0.0], [0.0, 9.0 * k]])) for k in range(3)]
+    places, crowded = place(apart)
+    assert crowded == 0 and [at[1] for at in places] == [0.0, 9.0, 18.0]
 
 
 def test_unknown_design(shell, parts):
     with pytest.raises(InputError, match="no such design"):
-        draw_assembly(parts, "other", shell.scene("rest").initial, "rest")
+        assembly_drawing(parts, "other", "m")

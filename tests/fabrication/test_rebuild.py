@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from kop_exudyn.equilibrium.newton import solve
-from kop_exudyn.exchange.export import export_workshop
+from kop_exudyn.fabrication.folder import export_workshop
 from kop_exudyn.fabrication.options import CutOptions
 from kop_exudyn.fabrication.pieces import parts_list
 from kop_exudyn.kit.cluster import cluster

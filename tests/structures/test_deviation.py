@@ -6,7 +6,6 @@ import pytest
 import kop_exudyn as kop
 from kop_exudyn.analysis.simulation import simulate
 from kop_exudyn.exchange.result_tables import result_tables
-from kop_exudyn.search.result import KitResult
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.structures.base import design_from_dict
@@ -84,8 +83,7 @@ def test_result_and_tables_have_the_same_numbers(shells):
             schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2
         ),
     )
-    outcome = optimize_kit(shells, {"linear": 3, "angular": 2}, settings=settings)
-    result = KitResult(shells, outcome.references, outcome.stages)
+    result = optimize_kit(shells, {"linear": 3, "angular": 2}, settings=settings)
     rows = result_tables(result)["designs"]
     for n, design in enumerate(shells):
         row = next(r for r in rows if r["design"] == design.name and r["stage"] == "assigned")

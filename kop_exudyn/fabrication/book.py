@@ -1,0 +1,78 @@
+"""The workshop's book: everything that is printed for a kit, page by page."""
+
+from __future__ import annotations
+
+from ..kit.kinds import part_kind
+from .assembly_drawing import AssemblyDrawing, assembly_pages
+from .assembly_order import assembly_steps, fasteners
+from .blanks import Blanks
+from .cutlist import cut_list, totals
+from .cutsheets import Sheet
+from .options import Tolerances
+from .paper import Book
+from .part_pages import plate_pages, sheet_pages, stock_pages, strip_pages
+from .stock import StockPlan
+
+# of cut lists, what stands in the note above or on the parts' own pages
+_ELSEWHERE = (
+    "tolerance_mm",
+    "tolerance_deg",
+    "section_mm",
+    "material",
+    "bolts_from_end_mm",
+    "bolts_from_corner_mm",
+    "setback_mm",
+    "leg_mm",
+    "bolt_hole_mm",
+)
+
+
+def workshop_book(
+    blanks: Blanks,
+    sheets: list[Sheet],
+    plan: StockPlan | None,
+    drawings: list[AssemblyDrawing],
+    *,
+    paper: str = "a3",
+    title: str = "Kit of parts",
+    tolerances: Tolerances = Tolerances(),
+) -> Book:
+    """Cut list, parts, bars, sheets, then of every design its steps, joints and drawing.
+
+    paper : "a4" or "a3"
+    Raises InputError for another paper.
+    """
+    book = Book(paper, title)
+    rows = cut_list(blanks, tolerances)
+    kept = [{name: value for name, value in row.items() if name not in _ELSEWHERE} for row in rows]
+    book.table("Cut list", kept, _note(blanks, tolerances))
+    material = totals(blanks)
+    book.table("Material and fasteners", [*material, *fasteners(blanks)])
+    strip_pages(book, blanks)
+    plate_pages(book, blanks)
+    stock_pages(book, blanks, plan)
+    sheet_pages(book, sheets)
+    for drawing in drawings:
+        if steps := assembly_steps(blanks, drawing.name):
+            book.table(f"Assembly of {drawing.name}: steps", steps)
+        assembly_pages(book, drawing)
+    return book
+
+
+def _note(blanks: Blanks, tolerances: Tolerances) -> str:
+    kinds = [part_kind(name) for name in blanks.parts.kit.parts]
+    lengths = f"lengths to {tolerances.length:g} mm"
+    angles = f", angles to {tolerances.angle:g} degrees" if any(k.angular for k in kinds) else ""
+    lines = [
+        "Pieces serve the designs one after the other: as many as the neediest uses. "
+        f"Keep {lengths}{angles}."
+    ]
+    if blanks.strips:
+        board = blanks.board
+        lines.append(
+            f"Strips: {board.section} mm {board.material}".rstrip()
+            + ". Saw to the cut length; holes are measured from the sawn end of side 1. l1 and l2 "
+            "are lengths of the axes from the joint to the corner points, "
+            f"{blanks.corners.setback:.1f} mm beyond either sawn end."
+        )
+    return "\n".join(lines)

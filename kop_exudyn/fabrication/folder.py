@@ -1,0 +1,145 @@
+"""The folder for the workshop: lists, plans, sheets, and the book to print."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..files.files import file_stem, make_folder
+from ..files.tables import write_csv
+from .assembly import joint_table, write_assembly_plan
+from .assembly_drawing import assembly_drawing, save_assembly_drawing
+from .assembly_order import assembly_steps, fasteners
+from .blanks import Blanks
+from .book import workshop_book
+from .cutlist import totals, write_bill, write_cut_list
+from .cutsheets import Sheet, cut_sheets, template_sheets
+from .dxf import write_dxf
+from .options import CutOptions, Tolerances
+from .pieces import PartsList
+from .placement import PlacedPieces
+from .stock import StockPlan, stock_plan
+from .svg import write_svg
+
+SHEET_FORMATS: dict[str, Callable[..., Path]] = {"svg": write_svg, "dxf": write_dxf}
+
+
+def export_workshop(
+    parts: PartsList,
+    folder: str | Path,
+    unit: str,
+    *,
+    options: CutOptions = CutOptions(),
+    tolerances: Tolerances = Tolerances(),
+    formats: Iterable[str] = tuple(SHEET_FORMATS),
+    paper: str = "a3",
+    title: str = "Kit of parts",
+    force: bool = False,
+    overwrite: bool = False,
+) -> list[Path]:
+    """Write all that a workshop needs; returns the files' paths.
+
+    Tables (CSV): cut_list, material, fasteners, bars; of every design its bill, assembly plan,
+    steps and joints. Drawings: workshop.pdf to print, the assembly of every design (SVG), cut
+    sheets and templates at true scale.
+
+    Parameters
+    ----------
+    parts : the kit and its pieces, see `parts_list_of`
+    folder : made where it isn't there
+    unit : the designs' unit of length
+    options, tolerances : sizes of sheets, bars, holes and gaps; how exactly to cut
+    formats : of the sheets, "svg" and "dxf"
+    paper : of the book, "a4" or "a3"
+    title : what the book is called
+    force : write the files also where parts can't be cut as they are
+
+    Raises InputError when a file exists already and `overwrite` is false, for what can't be cut
+    (see `Blanks.problems`), and for unknown formats or paper.
+    """
+    writers = {name: _known(name) for name in formats}
+    blanks = Blanks(parts, unit, options)
+    if not force:
+        blanks.check()
+    sheets, bars = cut_sheets(blanks), _bars(blanks, force)
+    drawings = [assembly_drawing(parts, pieces.design.name, unit) for pieces in parts.designs]
+    book = workshop_book(
+        blanks, sheets, bars, drawings, paper=paper, title=title, tolerances=tolerances
+    )
+    folder = make_folder(folder)
+    done = [write_cut_list(folder / "cut_list.csv", blanks, tolerances, overwrite=overwrite)]
+    tables = {"material": totals(blanks), "fasteners": fasteners(blanks), "bars": bar_rows(bars)}
+    for pieces in parts.designs:
+        name, stem = pieces.design.name, file_stem(pieces.design.name)
+        done.append(write_bill(folder / f"bill_{stem}.csv", parts, [name], overwrite=overwrite))
+        path = folder / f"assembly_{stem}.csv"
+        done.append(write_assembly_plan(path, parts, name, unit, overwrite=overwrite))
+        tables[f"steps_{stem}"] = assembly_steps(blanks, name)
+        tables[f"joints_{stem}"] = joint_table(parts, name, unit, joint_places(parts, name))
+    done += [
+        write_csv(folder / f"{name}.csv", rows, overwrite=overwrite)
+        for name, rows in tables.items()
+        if rows
+    ]
+    done.append(book.save(folder / "workshop.pdf", overwrite=overwrite))
+    for drawing in drawings:
+        done += save_assembly_drawing(drawing, folder, overwrite=overwrite)
+    for stem, found in {"cut_sheet": sheets, "templates": template_sheets(blanks)}.items():
+        done += _write_sheets(found, folder / stem, writers, overwrite)
+    return done
+
+
+def _bars(blanks: Blanks, force: bool) -> StockPlan | None:
+    """The plan for bars; none where the files are wanted although a strip is too long for them."""
+    try:
+        return stock_plan(blanks)
+    except InputError:
+        if not force:
+            raise
+        return None
+
+
+def bar_rows(plan: StockPlan | None) -> list[dict[str, object]]:
+    """One row a piece that is sawn from a bar, in order: the bar, its length, the cut's place."""
+    rows = []
+    for number, bar in enumerate(plan.bars if plan is not None else (), 1):
+        kerf = 0.0
+        if len(bar.pieces) > 1:
+            used = sum(length for _, length in bar.pieces)
+            kerf = (bar.length - bar.left - used) / (len(bar.pieces) - 1)
+        at = 0.0
+        for label, length in bar.pieces:
+            row = {"bar": number, "bar_mm": bar.length, "part": label, "from_mm": round(at, 3)}
+            rows.append(row | {"to_mm": round(at + length, 3), "left_mm": round(bar.left, 1)})
+            at += length + kerf
+    return rows
+
+
+def joint_places(parts: PartsList, name: str) -> np.ndarray:
+    """(n_joints, 3) where a design's joints are in its built state, in its unit of length."""
+    number = parts.row_of(name)
+    placed = PlacedPieces.of(parts.designs[number])
+    role = placed.design.fitted_role.name
+    state = parts.states[number][role] if parts.states else placed.scene.initial
+    return state.positions[placed.design.joints]
+
+
+def _write_sheets(
+    sheets: list[Sheet], stem: Path, writers: dict[str, Callable[..., Path]], overwrite: bool
+) -> list[Path]:
+    return [
+        write(stem.with_name(f"{stem.name}_{number}.{suffix}"), sheet, overwrite=overwrite)
+        for number, sheet in enumerate(sheets, 1)
+        for suffix, write in writers.items()
+    ]
+
+
+def _known(name: str) -> Callable[..., Path]:
+    if name not in SHEET_FORMATS:
+        raise InputError(
+            f"unknown (there are {', '.join(SHEET_FORMATS)})", field="formats", value=name
+        )
+    return SHEET_FORMATS[name]

@@ -1,0 +1,252 @@
+"""Drawings of parts for the workshop: dimensioned strips and plates, sheets, and bars to saw."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..drawing.labels import text_extent
+from ..drawing.style import FAINT, INK, QUIET
+from .blanks import Blanks, Strip
+from .cutsheets import Sheet
+from .paper import Book, Page, fitting_scale
+from .shapes import CUT, ENGRAVE, NOTES, Hole, Polyline, Shape, Text
+from .stock import StockPlan
+from .templates import Template, plate_template, strip_template
+
+_COLOURS = {CUT: INK, ENGRAVE: QUIET, NOTES: FAINT}
+_DIMENSION = 6.0  # points
+_STEP = 3.0  # mm between dimensions that stand side by side
+_STRIPS_A_PAGE = 5  # at least
+_STRIP_ROOM = 34.0  # mm of a page below and above a strip: caption and dimensions
+
+
+def strip_pages(book: Book, blanks: Blanks) -> None:
+    """Every strip with its dimensions from the sawn end of side 1."""
+    strips = blanks.strips
+    if not strips:
+        return
+    longest = max(strip.cut_length for strip in strips)
+    room = Page(book.paper, "").room
+    height = room[1] / _STRIPS_A_PAGE - _STRIP_ROOM
+    size = np.array([longest, strips[0].board.breadth])
+    scale = fitting_scale(size, np.array([room[0] - 10.0, height]))
+    page, y = None, 0.0
+    for strip in strips:
+        height = strip.board.breadth / scale + _STRIP_ROOM
+        if page is None or y - height < page.low[1]:
+            page = book.page("Strips: dimensions from the sawn end of side 1", scale)
+            y = page.high[1]
+        y -= height
+        _strip(page, strip, np.array([page.low[0] + 5.0, y + _STRIP_ROOM - 8.0]), scale)
+
+
+def plate_pages(book: Book, blanks: Blanks) -> None:
+    """Corner plates, at full size where the paper allows."""
+    plates = [plate_template(plate) for plate in blanks.plates]
+    if not plates:
+        return
+    room = Page(book.paper, "").room
+    size = np.max([np.ptp(plate.box, axis=0) for plate in plates], axis=0)
+    scale = fitting_scale(size, room - [10.0, 20.0])
+    cell = size / scale + [10.0, 16.0]
+    across, down = (max(int(n), 1) for n in room // cell)
+    note = blanks.plates[0]
+    for first in range(0, len(plates), across * down):
+        page = book.page("Corner plates", scale)
+        page.text(
+            page.low[0],
+            page.high[1],
+            f"Bolt holes {note.bolt_hole:g} mm, "
+            f"{_list(note.bolts)} mm from the corner point along either axis; "
+            f"{note.board.thickness:g} mm thick. "
+            "Turned over, a plate turns the other way.",
+            7.5,
+            va="top",
+            color=QUIET,
+        )
+        for k, plate in enumerate(plates[first : first + across * down]):
+            corner = page.low + cell * [k % across, down - 1 - k // across]
+            at = corner + [cell[0] / 2, 12.0 + size[1] / scale / 2]
+            _template(page, plate, at - np.mean(plate.box, axis=0) / scale, scale)
+            page.text(
+                corner[0] + cell[0] / 2,
+                corner[1] + 6.0,
+                f"{plate.label}: {plate.name}",
+                7.5,
+                ha="center",
+                va="center",
+                weight="bold",
+            )
+            page.text(
+                corner[0] + cell[0] / 2,
+                corner[1] + 2.5,
+                f"{plate.count} pieces",
+                7,
+                ha="center",
+                va="center",
+            )
+
+
+def sheet_pages(book: Book, sheets: Sequence[Sheet]) -> None:
+    """Every cut sheet, as large as the paper allows: what comes from the machine, to check and to
+    sort."""
+    for sheet in sheets:
+        room = Page(book.paper, "").room
+        scale = fitting_scale(np.array(sheet.size), room - [0.0, 6.0])
+        page = book.page(
+            f"{sheet.title}, {sheet.thickness:g} mm thick, "
+            f"{sheet.size[0]:g} x {sheet.size[1]:g} mm",
+            scale,
+        )
+        for shape in sheet.shapes:
+            if shape.layer != NOTES or (isinstance(shape, Polyline) and shape.closed):
+                _shape(page, shape, page.low, scale)
+
+
+def stock_pages(book: Book, blanks: Blanks, plan: StockPlan | None) -> None:
+    """Which pieces are sawn from which bar."""
+    if plan is None:
+        return
+    room = Page(book.paper, "").room
+    longest = max(bar.length for bar in plan.bars)
+    scale = fitting_scale(np.array([longest, 1.0]), np.array([room[0] - 30.0, 1e9]))
+    page, y = None, 0.0
+    for number, bar in enumerate(plan.bars, 1):
+        if page is None or y - 11.0 < page.low[1]:
+            page = book.page(f"Bars to saw, {blanks.board.section} mm", scale)
+            page.text(
+                page.low[0],
+                page.high[1],
+                f"{len(plan.bars)} bars, {plan.length / 1000:.2f} m in all, "
+                f"{100 * plan.used:.0f} % of it used; no plan needs less than "
+                f"{plan.least / 1000:.2f} m. "
+                f"Kerf {blanks.options.kerf:g} mm. Saw from the left; lengths in mm.",
+                7.5,
+                va="top",
+                color=QUIET,
+            )
+            y = page.high[1] - 8.0
+        y -= 10.0
+        x = page.low[0] + 10.0
+        page.text(page.low[0], y + 2.0, f"{number}", 8, va="center", weight="bold")
+        page.line(
+            [
+                [x, y],
+                [x + bar.length / scale, y],
+                [x + bar.length / scale, y + 4.0],
+                [x, y + 4.0],
+                [x, y],
+            ],
+            QUIET,
+        )
+        for label, length in bar.pieces:
+            step = length / scale
+            page.ax.fill(
+                [x, x + step, x + step, x],
+                [y, y, y + 4, y + 4],
+                facecolor="#f1ede4",
+                edgecolor=INK,
+                lw=0.6,
+            )
+            text = f"{label}  {length:.1f}"
+            if text_extent(text, 6.5)[0] > step - 1:
+                text = label
+            page.text(x + step / 2, y + 1.9, text, 6.5, ha="center", va="center")
+            x += step + blanks.options.kerf / scale
+        page.text(
+            page.low[0] + 12.0 + bar.length / scale,
+            y + 2.0,
+            f"left {bar.left:.0f}",
+            6.5,
+            va="center",
+            color=QUIET,
+        )
+
+
+def _strip(page: Page, strip: Strip, at: np.ndarray, scale: float) -> None:
+    """A strip with its caption above and its dimensions below; `at` is the lower left corner."""
+    template, half = strip_template(strip), strip.board.breadth / 2
+    origin = at + [0.0, half / scale]
+    _template(page, template, origin, scale)
+    top = at[1] + strip.board.breadth / scale
+    joint = (
+        f"joint hole {strip.hole:g} mm"
+        if strip.slot is None
+        else f"slot {strip.slot:.1f} mm wide, {strip.slot_depth:.1f} mm deep"
+    )
+    adapts = f"; sides {strip.slide:.1f} mm adjustable" if strip.slide else ""
+    page.text(at[0], top + 2.0, f"{strip.label}", 10, weight="bold")
+    page.text(
+        at[0] + 14.0,
+        top + 2.0,
+        f"{strip.count} pieces, {strip.board.section} mm: "
+        f"{strip.cut_length:.1f} long, {joint}, bolt holes {strip.bolt_hole:g} mm{adapts}",
+        8,
+    )
+    stations = [0.0, *strip.bolt_stations, strip.hole_from_end, strip.cut_length]
+    stations = sorted(stations)
+    places = _spread([at[0] + s / scale for s in stations], _STEP)
+    for station, x in zip(stations, places):
+        on = at[0] + station / scale
+        main = station in (strip.hole_from_end, strip.cut_length)
+        page.line(
+            [[on, at[1] - 0.8], [on, at[1] - 2.0], [x, at[1] - 6.0], [x, at[1] - 7.0]], QUIET, 0.15
+        )
+        page.text(
+            x,
+            at[1] - 7.5,
+            f"{station:.1f}",
+            _DIMENSION,
+            rotation=90,
+            ha="center",
+            va="top",
+            weight="bold" if main else "normal",
+        )
+
+
+def _spread(wanted: Sequence[float], apart: float) -> np.ndarray:
+    """Increasing places as near to the wanted ones as they can be at that distance: least squares,
+    by pooling those that are too near (isotonic regression)."""
+    shifted = np.array(wanted) - apart * np.arange(len(wanted))
+    blocks: list[tuple[float, int]] = []
+    for value in shifted:
+        blocks.append((float(value), 1))
+        while len(blocks) > 1 and blocks[-2][0] > blocks[-1][0]:
+            (b, n), (a, m) = blocks.pop(), blocks.pop()
+            blocks.append(((a * m + b * n) / (m + n), m + n))
+    flat = np.concatenate([np.full(n, value) for value, n in blocks])
+    return flat + apart * np.arange(len(wanted))
+
+
+def _template(page: Page, template: Template, origin: np.ndarray, scale: float) -> None:
+    for shape in template.shapes:
+        _shape(page, shape, origin, scale)
+
+
+def _shape(page: Page, shape: Shape, origin: np.ndarray, scale: float) -> None:
+    """A shape (mm) on paper, its (0, 0) at the origin."""
+    colour = _COLOURS[shape.layer]
+    if isinstance(shape, Polyline):
+        points = np.concatenate([shape.points, shape.points[:1]]) if shape.closed else shape.points
+        style = "-" if shape.layer == CUT else (0, (8, 2, 2, 2))
+        page.line(origin + points / scale, colour, 0.25 if shape.layer == CUT else 0.13, ls=style)
+    elif isinstance(shape, Hole):
+        turns = np.linspace(0, 2 * np.pi, 33)
+        circle = shape.diameter / 2 * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+        page.line(origin + (shape.centre + circle) / scale, colour)
+    else:
+        _text(page, shape, origin, scale, colour)
+
+
+def _text(page: Page, shape: Text, origin: np.ndarray, scale: float, colour: str) -> None:
+    x, y = origin + shape.at / scale
+    size = shape.height / scale / 0.72 * 72 / 25.4  # capital letters are 0.72 of the font size high
+    align = "center" if shape.align == "middle" else "left"
+    if size >= 2.0:
+        page.text(x, y, shape.text, size, color=colour, ha=align, va="center_baseline")
+
+
+def _list(values: Sequence[float]) -> str:
+    return " and ".join(f"{value:.1f}" for value in values)

@@ -1,0 +1,75 @@
+"""Whether a kit can be built: what would stop a workshop, or break what it made, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..errors import InputError, SimulationFailure
+from ..search.result import KitResult
+from .blanks import Blanks
+from .templates import templates
+
+
+def obstacles(result: KitResult, blanks: Blanks | None = None) -> list[str]:
+    """What is wrong with building a result's designs, one sentence each, naming the design or part.
+
+    blanks : what is cut; None for a result that is only looked at
+    A design is in the way when it was not found, when it is stressed beyond its limit in a state
+    that is built, or when its parts open into another state than the one shown; a part, when it has
+    no room for its holes or does not fit a sheet or bar.
+    """
+    found = [*_of_designs(result)]
+    if blanks is not None:
+        found += [*blanks.problems, *_of_boards(blanks)]
+    return found
+
+
+def refuse(found: list[str]) -> None:
+    """Raise InputError unless nothing is in the way."""
+    if found:
+        more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+        raise InputError(
+            f"can't be built: {found[0]}{more}; --force (force=True) writes the files anyway"
+        )
+
+
+def _of_designs(result: KitResult) -> Iterator[str]:
+    for number, design in enumerate(result.designs):
+        summary = result.summary("assigned", number)
+        if "failed" in summary:
+            yield f"{design.name} was not found: {summary['failed']}"
+            continue
+        for state, strength in summary["strength"].items():
+            used = strength["utilisation"]
+            if used is not None and used > 1:
+                yield (
+                    f"{design.name} is stressed to {100 * used:.0f} % of its elastic limit in its "
+                    f"{state} state"
+                )
+        if result.redeployed:
+            opened = result.redeployment(number)
+            if isinstance(result.redeployed[number], SimulationFailure):
+                yield f"{design.name} does not open by itself: {opened['failed']}"
+            elif not opened["same_state"]:
+                yield (
+                    f"{design.name} opens into another state, {opened['moved_percent']:.1f} % of "
+                    "its size from the one shown"
+                )
+
+
+def _of_boards(blanks: Blanks) -> Iterator[str]:
+    """Pieces that no sheet and no bar is large enough for."""
+    for strip in blanks.strips:
+        if blanks.options.stock and strip.cut_length > max(blanks.options.stock):
+            yield (
+                f"part {strip.label} is {strip.cut_length:.0f} mm long, longer than the longest "
+                f"bar of {max(blanks.options.stock):g} mm"
+            )
+    room = blanks.options.room
+    for template in templates(blanks):
+        width, height = template.size
+        if width > room[0] or height > room[1]:
+            yield (
+                f"part {template.label} of {width:.0f} x {height:.0f} mm is larger than a sheet's "
+                f"{room[0]:.0f} x {room[1]:.0f} mm"
+            )
