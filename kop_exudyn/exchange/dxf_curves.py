@@ -21,6 +21,7 @@ from .drawing import Drawing, DrawnCurve
 _DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE", "SPLINE", "ARC", "CIRCLE", "ELLIPSE")
 # of the drawing's size: how far points of arcs and splines may leave them between each other
 _SAG = 1e-4
+_BINARY = b"AutoCAD Binary DXF"
 _DEEPEST = 20  # blocks within blocks
 _MOST_ENTITIES = 200_000
 # $INSUNITS -> name, metres
@@ -85,9 +86,16 @@ def dxf_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
 
 def _document(ezdxf: Any, content: bytes) -> Any:
     try:
-        from ezdxf import recover
+        if content.startswith(_BINARY):
+            from ezdxf.document import Drawing as Document
+            from ezdxf.lldxf.tagger import binary_tags_loader
 
-        document, auditor = recover.read(io.BytesIO(content))
+            document = Document.load(binary_tags_loader(content))
+            auditor = document.audit()
+        else:
+            from ezdxf import recover
+
+            document, auditor = recover.read(io.BytesIO(content))
     except Exception as error:  # its readers raise whatever the broken file leads them to
         raise InputError(f"can't be read as DXF: {str(error)[:100]}") from None
     if auditor.has_errors:

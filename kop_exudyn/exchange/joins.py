@@ -34,6 +34,7 @@ from .drawing import DrawnCurve
 RULES = ("auto", "always", "never")
 _SHARP = np.pi / 2  # rad; ends that turn by more are hinged in any case
 _LARGEST_TURN = np.pi / 4  # rad; without families, pieces that turn by more are two curves
+_DOUBTFUL = np.radians(25)  # around the largest turn: places that a reader should look at
 
 End = tuple[int, int]  # number of the curve; 0: its first point, -1: its last
 
@@ -44,7 +45,7 @@ class Joined:
 
     curves : in the order of their first pieces
     seams, tips (n, 3) : where pieces were joined, and where ends that meet stay two curves
-    by_turn : places of seams and tips that only the turn decided, and of seams with a corner
+    by_turn : places of seams and tips that only a middling turn decided, and of seams with a corner
     families : whether the pieces fall into two families
     """
 
@@ -208,7 +209,8 @@ class _Decision:
             differ = turn > _LARGEST_TURN
         if differ is None:
             differ = turn > _LARGEST_TURN
-            self.unsure.append(self.ends[a])
+            if abs(turn - _LARGEST_TURN) < _DOUBTFUL:
+                self.unsure.append(self.ends[a])
         elif not differ and turn > _LARGEST_TURN:
             self.unsure.append(self.ends[a])
         if differ:
