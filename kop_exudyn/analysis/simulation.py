@@ -14,6 +14,7 @@ from ..equilibrium.equilibria import Equilibrium
 from ..equilibrium.exudyn_model import Confirmation, ExudynModel
 from ..equilibrium.newton import refine
 from ..errors import SimulationFailure
+from ..scene.limits import HingeLimits
 from ..structures.base import Design
 from ..structures.deviation import fit_summary
 from ..structures.fitting import FitResult, TargetFitting
@@ -69,7 +70,10 @@ class SimulationResult:
     def to_dict(self) -> dict[str, Any]:
         """As `kop simulate --json` prints it.
 
-        Besides figures named as the attributes: "strength", by state the largest equivalent stress,
+        Besides figures named as the attributes: "escapes", unstable states that were left on the
+        way, so that the structure may open to another shape as well; "hinge_limits", where joints
+        have limits: how many there are, how many their limits press on, and how far, rad, the worst
+        is beyond its own (negative: within); "strength", by state the largest equivalent stress,
         its share of the elastic limit and the rod element where that is; "loaded", under loads, see
         `LoadedState.to_dict`.
         """
@@ -90,9 +94,27 @@ class SimulationResult:
             "exudyn": self.confirmations[self.design.fitted_role.name].to_dict(),
             "fit": fit_summary(self.design, self.design.target, self.fit, final.state),
             "displaced_percent": self.displaced_percent,
+            "escapes": final.escapes,
+            **self._limits(),
             "strength": strength_summary(self.design, self.equilibria),
             **({"loaded": self.loaded.to_dict()} if self.loaded is not None else {}),
             "joints": self.joints.tolist(),
+        }
+
+    def _limits(self) -> dict[str, Any]:
+        """How the deployed state keeps its hinges' limits; empty where it has none."""
+        scene = self.design.scene(self.design.fitted_role.name)
+        limits = [term for term in scene.terms if isinstance(term, HingeLimits)]
+        if not limits:
+            return {}
+        beyond = np.concatenate([term.beyond(self.deployed.state) for term in limits])
+        touched = sum(int(term.touched(self.deployed.state).sum()) for term in limits)
+        return {
+            "hinge_limits": {
+                "hinges": len(beyond),
+                "touched": touched,
+                "furthest": float(beyond.max()),
+            }
         }
 
 

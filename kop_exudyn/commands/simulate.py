@@ -116,6 +116,8 @@ def _summary(result: dict, units: Units | None) -> str:
         rows["opening angle"] = f"{angle:.4g} rad, {math.degrees(angle):.4g}° in the mean"
         if result["assembly_angle"] is not None:
             rows["opening angle"] += f", from {math.degrees(result['assembly_angle']):.4g}°"
+    if "hinge_limits" in result:
+        rows["hinge limits"] = _limits(result["hinge_limits"])
     rows |= {
         f"stress, {role}": _stress(strength, units) for role, strength in result["strength"].items()
     }
@@ -123,6 +125,13 @@ def _summary(result: dict, units: Units | None) -> str:
         rows |= _under_load(result["loaded"], units)
     width = max(15, *map(len, rows))
     return "".join(f"{name:<{width}} {value}\n" for name, value in rows.items())
+
+
+def _limits(limits: dict) -> str:
+    """How many joints touch their limits."""
+    furthest = math.degrees(limits["furthest"])
+    beyond = f", the furthest {furthest:.2g}° beyond" if furthest > 0 else ""
+    return f"touched by {limits['touched']} of {limits['hinges']} joints{beyond}"
 
 
 def _under_load(loaded: dict, units: Units | None) -> dict[str, str]:

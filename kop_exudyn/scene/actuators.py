@@ -67,12 +67,12 @@ class LinearActuators(SceneTerm):
         """(m, 2) the bodies that each actuator joins, in the order of its unknowns."""
         return np.stack([self.top, self.bottom], axis=1)
 
-    def weighted(self, weight: Any) -> LinearActuators:
-        """The same actuators with other weights."""
+    def weighted(self, weight: Any, spacing: Any = None) -> LinearActuators:
+        """The same actuators with other weights, and perhaps other spacings to aim at."""
         return LinearActuators(
             self.top,
             self.bottom,
-            self.spacing,
+            self.spacing if spacing is None else spacing,
             weight,
             alignment=self.alignment,
             extension=self.extension,

@@ -196,6 +196,11 @@ class SceneBuilder:
         """Add a load, an attraction or an actuator."""
         self._terms.append(term)
 
+    @property
+    def n_bodies(self) -> int:
+        """Bodies so far."""
+        return self._n_bodies
+
     def build(self) -> Scene:
         """The finished scene. Raises InputError where pieces don't fit together."""
         if not self._rods:

@@ -4,7 +4,7 @@ plates together."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,9 @@ from ...kit.groups import ElementGroup
 from ...rods.sections import Material, material_from_dict
 from ...units import Units
 from ..base import Design, Role, Target, register_class, register_format
+from ..fitting import best_placement
 from .bodies import RODS, joint_bodies
+from .deployment import Deployment, Solver, Stage, drawn_towards, follow, state_of
 from .layout import BaseMesh, Plates, umbrella_mesh
 from .mesh import UmbrellaMesh, UmbrellaTarget
 from .pins import Pins, pins_from_dict
@@ -32,26 +34,6 @@ _LEAST_LENGTH = 32 / 30
 _MIN_ELEMENTS, _MAX_ELEMENTS = 1, 20
 
 
-@dataclass(frozen=True)
-class Deployment:
-    """How an umbrella mesh is opened.
-
-    weights : of the actuators, one solve after the other
-    attraction : weight that pulls X joints and cell midpoints to their places meanwhile; 0 in the
-        final state
-    share : of the attraction, omega; the rest, 1e-5 of it, would pull towards the surface and is
-        left out
-    angle : rad, turn of all hinges in the compact state, so that it isn't the unstable equilibrium
-    tolerance : relative residual of all solves but the last
-    """
-
-    weights: tuple[float, ...] = (1e-3, 1e-2, 1e-1, 1.0)
-    attraction: float = 0.1
-    share: float = 0.99999
-    angle: float = 1e-3
-    tolerance: float = 1e-5
-
-
 class Umbrella(Design):
     """An umbrella mesh. Its parameters are the arm lengths: top and bottom of every cell, one cell
     after the other.
@@ -66,6 +48,8 @@ class Umbrella(Design):
     arms, plates : materials
     arm_elements, plate_elements : rod elements in an arm and in a plate rod
     plate_model : "rods", or "rigid": plates as bodies that don't bend, with fewer unknowns
+    joint_limits : weight of the soft limits of the joints' turns, T joints 0 to 90, X joints 0 to
+        180 degrees; 1 as published, 0 for joints that turn without limits
     least_length : lower bound of arm lengths, default 32/30 of the plate edge
     pins : supports in the final state; without them the central X joint is held
     deployment : how it is opened
@@ -85,6 +69,7 @@ class Umbrella(Design):
         arm_elements: int = 3,
         plate_elements: int = 1,
         plate_model: str = RODS,
+        joint_limits: float = 1.0,
         least_length: float | None = None,
         pins: Pins | None = None,
         deployment: Deployment = Deployment(),
@@ -96,6 +81,7 @@ class Umbrella(Design):
             plate_elements,
             plate_model,
         )
+        self.joint_limits = joint_limits
         self._bodies = joint_bodies(mesh, plate_model)
         lengths = mesh.lengths.ravel()
         self.least_length = (
@@ -132,7 +118,12 @@ class Umbrella(Design):
         return umbrella_scene(
             self.mesh,
             UmbrellaModel(
-                self.arm_elements, self.plate_elements, self.arms, self.plates, self.plate_model
+                self.arm_elements,
+                self.plate_elements,
+                self.arms,
+                self.plates,
+                self.plate_model,
+                self.joint_limits,
             ),
             len(self.parameters),
         )
@@ -160,42 +151,60 @@ class Umbrella(Design):
         return scene.with_pins(pinned)
 
     def deploy(self, q: np.ndarray | None = None) -> dict[str, Equilibrium]:
-        """Open the mesh from its compact state.
+        """Open the mesh from its compact state, along the path that `deployment` describes.
 
-        The actuators' weight grows in steps under the attraction; then the attraction is taken away
-        and the central X joint held where it is, or the mesh laid on its pins. Raises
-        SimulationFailure.
+        At its end the attraction is gone and the central X joint held where it is, or the mesh laid
+        on its pins. `escapes` of the equilibrium counts the unstable states that were left on the
+        way: where there are any, the mesh may open to another shape. Raises SimulationFailure.
         """
+        q = self.parameters if q is None else np.asarray(q, float)
+        try:
+            *done, final = follow(*self._path(q), self.deployment, self.name)
+        except SimulationFailure as failure:
+            try:
+                *done, final = follow(*self._path(q, gentle=True), self.deployment, self.name)
+            except SimulationFailure:
+                raise failure from None
+        return {"deployed": final.after(*done)}
+
+    def _path(self, q: np.ndarray, gentle: bool = False) -> tuple[State, list[Stage], Solver]:
+        """The compact state as near to the target as it can be, the stages, and what solves one."""
         from ...equilibrium.newton import NewtonOptions, solve
         from ...equilibrium.system import System
 
-        q = self.parameters if q is None else np.asarray(q, float)
-        attraction = self.attractions()
-        scene = self._model.scene if attraction else self._held
-        options, done = NewtonOptions(tolerance=self.deployment.tolerance), []
-        start = self._model.compact(q, self.deployment.angle)
-        for weight in self.deployment.weights:
-            actuators = self._model.actuators.weighted(weight * self._model.energy_scale)
-            system = System(scene.with_terms(actuators, *attraction))
-            start = self._solved(solve, system, q, start, options, f"actuator weight {weight:g}")
-            done.append(start)
-        if self.pins is not None:
-            places = q[self.mesh.lengths.size :].reshape(-1, 3)
-            start = self.pins.aligned(start.state, self.joints[self.pins.joints], places)
-        final = self._solved(
-            solve, self.systems["deployed"], q, start, NewtonOptions(), "final state"
-        )
-        return {"deployed": final.after(*done)}
+        model, attraction = self._model, self.attractions()
+        compact = model.compact(q, self.deployment.angle)
+        if attraction:
+            x = np.concatenate([term.queries(compact) for term in attraction])
+            places = np.concatenate([term.targets for term in attraction])
+            placed = best_placement(x, places, np.full(len(x), 1 / len(x)))
+            compact = compact.transformed(placed.rotation, placed.translation)
+        scene = model.scene if attraction else self._held
+        upright = model.actuators.spacings(compact)
 
-    def _solved(self, solve, system, q, start, options, where: str) -> Equilibrium:
-        try:
+        def reach(stage: Stage, start: State | Equilibrium, iterations: int) -> Equilibrium:
+            if stage.final:
+                options = NewtonOptions(max_iterations=iterations)
+                if self.pins is not None:
+                    places = q[self.mesh.lengths.size :].reshape(-1, 3)
+                    start = self.pins.aligned(
+                        state_of(start), self.joints[self.pins.joints], places
+                    )
+                return solve(self.systems["deployed"], q, start, options=options)
+            spacing = upright + stage.opening * (self.mesh.spacing - upright)
+            actuators = model.actuators.weighted(stage.actuators * model.energy_scale, spacing)
+            drawn = (
+                drawn_towards(term, compact, stage.opening, stage.attraction) for term in attraction
+            )
+            system = System(scene.with_terms(actuators, model.limits, *drawn))
+            options = NewtonOptions(tolerance=self.deployment.tolerance, max_iterations=iterations)
             return solve(system, q, start, options=options)
-        except SimulationFailure as failure:
-            raise failure.within(f"{self.name}: {where}") from None
+
+        return compact, self.deployment.path(gentle), reach
 
     def attractions(self) -> tuple[Attraction, ...]:
-        """The attraction during deployment: X joints and cell midpoints to their places, as far as
-        these are known.
+        """The attraction during deployment, of weight 1: X joints and cell midpoints to their
+        places, as far as these are known.
 
         Energy: weight share / (2 l0^2 3 n) sum |x - x*|^2 over n points, l0 the compact mesh's
         bounding-box diagonal.
@@ -211,8 +220,7 @@ class Umbrella(Design):
         n = np.count_nonzero(known) + np.count_nonzero(placed)
         if not n:
             return ()
-        weight = self.deployment.attraction * self.deployment.share / (3 * n)
-        weight *= self._model.energy_scale / self.mesh.size**2
+        weight = self.deployment.share / (3 * n) * self._model.energy_scale / self.mesh.size**2
         centres = self._bodies.body[self.mesh.centres]
         pulled = ((self.joints, target.crossings, known), (centres, target.plates, placed))
         return tuple(
@@ -284,6 +292,7 @@ class Umbrella(Design):
             "arm_elements": self.arm_elements,
             "plate_elements": self.plate_elements,
             "plate_model": self.plate_model,
+            "joint_limits": self.joint_limits,
             "least_length": self.least_length,
             "pins": self.pins,
             "deployment": self.deployment,
@@ -320,6 +329,7 @@ def umbrella_from_dict(data: Mapping[str, Any], source: str = "design") -> Umbre
             arm_elements=_count(data, "arm_elements", 3),
             plate_elements=_count(data, "plate_elements", 1),
             plate_model=data.get("plate_model", RODS),
+            joint_limits=float(data.get("joint_limits", 1.0)),
             least_length=data.get("least_length"),
         )
     except KeyError as error:

@@ -10,6 +10,7 @@ import numpy as np
 from ...rods.sections import Material, rectangle
 from ...scene.actuators import LinearActuators
 from ...scene.builder import SceneBuilder
+from ...scene.limits import HingeLimits
 from ...scene.scene import Scene
 from ...scene.state import State
 from .bodies import RIGID, RODS, JointBodies, joint_bodies
@@ -28,6 +29,7 @@ class UmbrellaModel:
     arms, plates : materials
     plate_model : "rods" or "rigid", see `joint_bodies`; elements and material of rigid plates don't
         count
+    joint_limits : weight of the hinges' limits, 1 as published; 0: hinges turn without limits
     """
 
     arm_elements: int = 3
@@ -35,6 +37,7 @@ class UmbrellaModel:
     arms: Material = Material(1400.0, 0.35)
     plates: Material = Material(14000.0, 0.35)
     plate_model: str = RODS
+    joint_limits: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,7 @@ class UmbrellaScene:
 
     bodies : where the joints are; nothing is pinned, the actuators have weight 1
     actuators : the scene's actuators
+    limits : of its hinges: T joints turn from 0 to 90 degrees, X joints from 0 to 180
     energy_scale : energy of an actuator or attraction weight of 1
     interior_rod, interior_fraction (m,) : where the bodies inside the rods lie
     """
@@ -51,6 +55,7 @@ class UmbrellaScene:
     bodies: JointBodies
     scene: Scene
     actuators: LinearActuators
+    limits: HingeLimits
     energy_scale: float
     interior_rod: np.ndarray
     interior_fraction: np.ndarray
@@ -132,7 +137,17 @@ def umbrella_scene(
         top, bottom, mesh.spacing, scale, extension=mesh.size**-2, shear=mesh.size**-2
     )
     build.term(actuators)
-    return UmbrellaScene(mesh, bodies, build.build(), actuators, scale, rod_of, fraction)
+    crossing = np.isin(np.flatnonzero(hinged), mesh.crossings)
+    limits = HingeLimits(
+        np.arange(len(crossing)),
+        0.0,
+        np.where(crossing, np.pi, np.pi / 2),
+        model.joint_limits * scale,
+        build.n_bodies,
+    )
+    if model.joint_limits:
+        build.term(limits)
+    return UmbrellaScene(mesh, bodies, build.build(), actuators, limits, scale, rod_of, fraction)
 
 
 def _rod_frames(tangents: np.ndarray, normals: np.ndarray) -> np.ndarray:
