@@ -154,6 +154,24 @@ class Surface(ABC):
         return local
 
 
+class ScaledSurface(Surface):
+    """A surface at another size, with the same parameters.
+
+    surface : at its own size; scale : positive
+    """
+
+    def __init__(self, surface: Surface, scale: float):
+        self.surface, self.scale = surface, scale
+        self.lower, self.upper = surface.lower, surface.upper
+
+    def derivatives(self, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        points, first, second = self.surface.derivatives(uv)
+        return self.scale * points, self.scale * first, self.scale * second
+
+    def contains(self, uv: np.ndarray) -> np.ndarray:
+        return self.surface.contains(uv)
+
+
 class AnalyticSurface(Surface):
     """A surface given by a formula.
 

@@ -227,3 +227,42 @@ def design_from_dict(data: Mapping[str, Any], source: str = "design") -> Design:
         design.loads = load_case_from_dict(data)
         design.loads.check(len(design.joints), source)
     return design
+
+
+Rescaling = Callable[[Mapping[str, Any], float], dict[str, Any]]
+_RESCALINGS: dict[str, Rescaling] = {}
+
+
+def register_rescaling(class_name: str) -> Callable[[Rescaling], Rescaling]:
+    """Decorator: the function that gives a design file's content at another size, all lengths of
+    elements multiplied by a factor and sections kept. Classes whose designs can't be rescaled have
+    none."""
+
+    def add(rescaling: Rescaling) -> Rescaling:
+        _RESCALINGS[class_name] = rescaling
+        return rescaling
+
+    return add
+
+
+def can_be_rescaled(design: Design) -> bool:
+    """Whether there are designs of this class at other sizes that share parts with it."""
+    return design.class_name in _RESCALINGS
+
+
+def rescaled(data: Mapping[str, Any], factor: float) -> dict[str, Any]:
+    """A design file's content at another size, see `register_rescaling`.
+
+    data : of a file that has been read as a design; factor : positive
+
+    Raises InputError for classes whose designs can't be rescaled.
+    """
+    class_name = data.get("class")
+    if class_name not in _RESCALINGS:
+        raise InputError(
+            f"designs of this class can't be rescaled (those of {', '.join(sorted(_RESCALINGS))} "
+            "can)",
+            field="class",
+            value=class_name,
+        )
+    return _RESCALINGS[class_name](data, factor)

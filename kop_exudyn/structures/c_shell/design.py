@@ -13,7 +13,7 @@ imperfection that unfolds the pitchfork.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,7 @@ from ...geometry.network_faces import triangulate
 from ...geometry.triangles import TriangleSurface
 from ...rods.sections import material_from_dict, section_from_dict
 from ...scene.scene import Scene
-from ..base import Design, Role, Target, register_class
+from ..base import Design, Role, Target, register_class, register_rescaling
 from ..mesh_target import load_target_mesh, target_on_mesh
 from .opening import check_hinges, check_opening
 from .scene import RodModel, lay_out, shell_scene
@@ -250,3 +250,22 @@ def read_c_shell(data: Mapping[str, Any], source: str) -> CShell:
         )
     except InputError as error:
         raise error.at(source) from None
+
+
+@register_rescaling("c_shell")
+def rescaled_c_shell(data: Mapping[str, Any], factor: float) -> dict[str, Any]:
+    """The C-shell at another size: its curves, where they are joined, and its target."""
+
+    def larger(points: Sequence[Sequence[float]]) -> list[list[float]]:
+        return [[factor * x for x in point] for point in points]
+
+    found = dict(data)
+    found["curves"] = [curve | {"points": larger(curve["points"])} for curve in data["curves"]]
+    if not isinstance(data.get("crossings", "find"), str):
+        found["crossings"] = [
+            joint | {"near": larger([joint["near"]])[0]} if "near" in joint else joint
+            for joint in data["crossings"]
+        ]
+    if "target" in data:
+        found["target"] = data["target"] | {"scale": factor * data["target"].get("scale", 1.0)}
+    return found

@@ -16,9 +16,9 @@ import numpy as np
 
 from ...errors import InputError, SimulationFailure
 from ...geometry.network import CurveNetwork
-from ...geometry.surfaces import AnalyticSurface, Surface
+from ...geometry.surfaces import AnalyticSurface, ScaledSurface, Surface
 from ...rods.sections import Material, Section, material_from_dict, section_from_dict
-from ..base import Design, Role, Target, register_class
+from ..base import Design, Role, Target, register_class, register_rescaling
 from ..loads import hold_in_place
 from .grid_network import network_on
 from .lamellas import straighten_on
@@ -219,7 +219,10 @@ def grid_on(surface: Surface, data: Mapping[str, Any]) -> Grid:
 
 
 def _surface(data: Mapping[str, Any], source: str) -> Surface:
-    options = {key: value for key, value in data.items() if key != "type"}
+    options = {key: value for key, value in data.items() if key not in ("type", "size")}
+    if "size" in data:
+        whole = _surface({"type": data["type"], **options}, source)
+        return ScaledSurface(whole, float(data["size"]))
     if data["type"] == "analytic":
         return AnalyticSurface(options.pop("name"), options)
     if data["type"] == "mesh":
@@ -234,3 +237,10 @@ def _surface(data: Mapping[str, Any], source: str) -> Surface:
     raise InputError(
         "unknown kind of surface (known: analytic, mesh)", field="surface.type", value=data["type"]
     )
+
+
+@register_rescaling("grid")
+def rescaled_grid(data: Mapping[str, Any], factor: float) -> dict[str, Any]:
+    """The grid at another size: its surface, with the curves at the same parameters."""
+    size = factor * data["surface"].get("size", 1.0)
+    return {**data, "surface": {**data["surface"], "size": size}}

@@ -1,0 +1,154 @@
+"""``kop check``: whether designs suit each other, before a kit is sought for them."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .output import add_json, report
+from .values import design_selection, number_pair, part_counts
+
+if TYPE_CHECKING:
+    from ..analysis.input_check import DesignCheck
+
+HELP = "say what is wrong with designs, and which ones make a kit expensive"
+DESCRIPTION = """Opens every design of a folder, or of a study file, by itself: whether it does, how
+well it fits its own target, how much of its elastic limit it uses. Then compares the elements of
+all designs: what each design shares in the projection energy of a kit of so many parts, how much
+nearer the others would be to theirs without it, which of its elements are dearest, and what to do:
+another size, another division of its curves, fitting it to its target first.
+
+--harmonise looks for the sizes, within a range, at which the designs suit each other best, and
+writes the rescaled designs to DIR. Sections stay as they are; the first design keeps its size."""
+EXAMPLES = """examples:
+  kop check models/conformals --designs 5 --parts linear=12,angular=5
+  kop check study.toml --json
+  kop check models/grids --parts linear=8,angular=4 --harmonise 0.8,1.25 --out out/harmonised"""
+
+_DEFAULT_PARTS = 8  # of a kind, where nothing is said about it
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "folder", type=Path, metavar="FOLDER|STUDY", help="folder of designs, or a study (.toml)"
+    )
+    parser.add_argument(
+        "--parts",
+        type=part_counts,
+        metavar="KIND=N,...",
+        help=f"parts of the kit that the designs are compared by (default: what the study says, "
+        f"else {_DEFAULT_PARTS} of each kind)",
+    )
+    parser.add_argument(
+        "--designs",
+        type=design_selection,
+        metavar="N|NAMES",
+        help="the first N designs, or names of files without .json (default: all)",
+    )
+    parser.add_argument(
+        "--harmonise",
+        type=number_pair,
+        metavar="LOW,HIGH",
+        help="rescale designs within this range, as 0.8,1.25, and write them to DIR",
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for rescaled designs")
+    add_json(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    from ..analysis.input_check import check_designs
+    from ..errors import InputError
+    from ..io.studies import load_study
+
+    if (args.harmonise is None) != (args.out is None):
+        raise InputError(
+            "--harmonise writes to a folder: give it with --out",
+            field="--out" if args.out is None else "--harmonise",
+        )
+    if args.harmonise is not None:
+        low, high = args.harmonise
+        if not 0 < low <= 1 <= high:
+            raise InputError(
+                "expected two factors, the first from 0 to 1, the second from 1 on",
+                field="--harmonise",
+                value=f"{low:g},{high:g}",
+            )
+    study = load_study(args.folder, args.designs)
+    designs = study.designs()
+    counts: dict[str, int] = {}
+    for design in designs:
+        for group in design.groups:
+            counts[group.kind] = counts.get(group.kind, 0) + len(group.indices)
+    given = {**study.parts, **(args.parts or {})}
+    parts = {
+        kind: given.get(kind, min(_DEFAULT_PARTS, count))
+        for kind, count in sorted(counts.items())
+        if count
+    } | {kind: count for kind, count in given.items() if kind not in counts}
+    checks = check_designs(designs, parts)
+    data: dict[str, Any] = {"parts": parts, "designs": [check.to_dict() for check in checks]}
+    text = _text(checks, parts)
+    if args.harmonise is not None:
+        found = _harmonised(args, study.files, designs, parts)
+        data["harmonised"] = found
+        text += _about_sizes(found)
+    report(args, data, text)
+    return 1 if any(check.failed for check in checks) else 0
+
+
+def _harmonised(
+    args: argparse.Namespace, files: Any, designs: Any, parts: Mapping[str, int]
+) -> dict[str, Any]:
+    """Look for sizes, write the designs at these; what came of it."""
+    from ..analysis.input_check import harmonised
+    from ..io.rescaling import save_rescaled
+
+    sizes, before, after = harmonised(designs, parts, args.harmonise)
+    written = save_rescaled(files, [sizes[design.name] for design in designs], args.out)
+    return {
+        "scales": sizes,
+        "energy_before": before,
+        "energy_after": after,
+        "files": [str(path) for path in written],
+    }
+
+
+def _text(checks: list[DesignCheck], parts: Mapping[str, int]) -> str:
+    kit = " and ".join(f"{count} {kind}" for kind, count in parts.items())
+    lines = [f"{len(checks)} designs, compared by a kit of {kit} parts"]
+    for check in checks:
+        lines.append(f"\n{check.name}")
+        if check.failed is None:
+            used = [u for u in check.utilisation.values() if u is not None]
+            strength = f", stress {100 * max(used):.0f} % of the elastic limit" if used else ""
+            lines.append(
+                f"  opens; deviation max {check.max_percent:.2g} %, mean "
+                f"{check.mean_percent:.2g} % of its box{strength}"
+            )
+        lines.append(
+            f"  {check.elements_percent:.0f} % of the elements, {check.energy_percent:.0f} % of "
+            f"the projection energy; without it the others' is {check.others_gain_percent:.0f} % "
+            f"lower"
+        )
+        for cost in check.expensive[:1]:
+            lines.append(
+                f"  dearest: {cost.kind} element {cost.number} ({_numbers(cost.parameters)}), its "
+                f"part ({_numbers(cost.part)}): {cost.percent:.2g} % of the energy"
+            )
+        lines += [f"  PROBLEM: {problem}" for problem in check.problems]
+        lines += [f"  advice: {advice}" for advice in check.advice]
+    return "\n".join(lines) + "\n"
+
+
+def _about_sizes(found: Mapping[str, Any]) -> str:
+    sizes = ", ".join(f"{name} {scale:.4g}" for name, scale in found["scales"].items())
+    less = 100 * (1 - found["energy_after"] / found["energy_before"])
+    return f"\nsizes: {sizes}; {less:.0f} % less projection energy of lengths\n" + "".join(
+        f"{path}\n" for path in found["files"]
+    )
+
+
+def _numbers(values: list[float]) -> str:
+    return ", ".join(f"{value:.4g}" for value in values)

@@ -1,0 +1,48 @@
+"""Design files at another size."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..files.files import make_folder
+from ..files.json_files import read_json, write_json
+from ..structures.base import rescaled
+
+
+def save_rescaled(files: Sequence[Path], scales: Sequence[float], folder: str | Path) -> list[Path]:
+    """Write designs at other sizes to a folder, under their own names; returns the new files.
+
+    files : design files; scales : how many times as large each becomes
+
+    Files that they name, relative to themselves, are named relative to the new folder. Raises
+    InputError where a design can't be rescaled or a file exists.
+    """
+    folder = Path(folder)
+    content = []
+    for file, scale in zip(files, scales):
+        data = read_json(file)
+        try:
+            content.append(rescaled(data, scale) if scale != 1 else dict(data))
+        except InputError as error:
+            raise error.at(file) from None
+    made = make_folder(folder)
+    return [
+        write_json(made / file.name.removesuffix(".gz"), _moved(data, file.parent, made))
+        for file, data in zip(files, content)
+    ]
+
+
+def _moved(value: Any, old: Path, new: Path) -> Any:
+    """The same with the paths in fields "file" relative to another folder."""
+    if isinstance(value, dict):
+        return {
+            key: Path(os.path.relpath(old / item, new)).as_posix()
+            if key == "file" and isinstance(item, str)
+            else _moved(item, old, new)
+            for key, item in value.items()
+        }
+    return [_moved(item, old, new) for item in value] if isinstance(value, list) else value

@@ -1,0 +1,153 @@
+"""Kits so small that the best one is known: every assignment is tried, with the parts solved for.
+
+The designs are strips with marked joints, their ends pinned closer together than they are long, so
+that they bulge: planar elasticas. The elements are the strip's pieces about a joint, of two lengths
+each. With four pieces and two parts there are 36 assignments that differ by more than names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from kop_exudyn.equilibrium.newton import Equilibrium, solve
+from kop_exudyn.kit.cluster import best_parts
+from kop_exudyn.kit.elements import Labels, collect
+from kop_exudyn.kit.groups import ElementGroup
+from kop_exudyn.kit.parts import Assignment, Kit
+from kop_exudyn.rods.rotations import rotation_z
+from kop_exudyn.scene.builder import SceneBuilder
+from kop_exudyn.search.dataset import Dataset
+from kop_exudyn.search.objective import Weights
+from kop_exudyn.search.pool import DesignPool
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings, StageSettings
+from kop_exudyn.search.stages import Stages
+from kop_exudyn.structures.base import Design, Role, Target
+
+SECTION = np.array([1e5, 4e4, 4e4, 0.8, 1.0, 1.0])  # slender: EA L^2 / EI is about 1e5
+_SAME = 1e-3  # of J: optima that close are one
+
+
+class Strip(Design):
+    """Pieces of given lengths in a row, their outer ends pinned `span` apart; bulges to +y.
+
+    pieces : (n, 2) lengths of each piece before and after its joint
+    """
+
+    class_name = "strip"
+
+    def __init__(self, name: str, pieces: np.ndarray, span: float):
+        self.name, self.span = name, span
+        self.parameters = np.asarray(pieces, float).ravel()
+        n = len(self.parameters)
+        self.lower, self.upper = np.full(n, 0.02), np.full(n, np.inf)
+        self.groups = [ElementGroup("linear", np.arange(n).reshape(-1, 2))]
+        self.roles = (Role("deployed", fitted=True),)
+        self._scene = self._build()
+
+    def _build(self) -> Any:
+        q = self.parameters
+        stations = np.concatenate([[0], np.cumsum(q)]) / q.sum()
+        fine = np.interp(np.linspace(0, len(q), 2 * len(q) + 1), np.arange(len(q) + 1), stations)
+        rise = 0.5 * np.sqrt(q.sum() ** 2 - self.span**2)
+        places = np.stack([fine * self.span, rise * np.sin(np.pi * fine), 0 * fine], axis=1)
+        slope = np.arctan2(rise * np.pi * np.cos(np.pi * fine), self.span)
+        builder = SceneBuilder(len(q))
+        bodies = builder.bodies(places, rotation_z(slope))
+        nodes = builder.nodes(bodies)
+        for k in range(len(q)):
+            builder.rod(nodes[2 * k : 2 * k + 3], SECTION, parameter=k)
+        builder.pin(bodies[0], (0, 1, 2, 3, 4))
+        builder.pin(bodies[-1], (0, 1, 2, 3))
+        self.joints = bodies[2:-1:4]
+        return builder.build()
+
+    def scene(self, role: str) -> Any:
+        return self._scene
+
+    def deploy(self, q: np.ndarray | None = None) -> dict[str, Equilibrium]:
+        return {"deployed": solve(self.systems["deployed"], self.parameters if q is None else q)}
+
+    @cached_property
+    def target(self) -> Target:
+        joints = self.deploy()["deployed"].state.positions[self.joints]
+        strip = np.concatenate([joints + [0, 0, z] for z in (-0.1, 0.1)])
+        n = len(joints)
+        faces = [f for k in range(n - 1) for f in ((k, k + 1, n + k), (k + 1, n + k + 1, n + k))]
+        return Target(strip, np.array(faces), joints, float(np.linalg.norm(np.ptp(joints, axis=0))))
+
+
+def strip_of(seed: int) -> Strip:
+    """A random strip of four pieces."""
+    rng = np.random.default_rng(seed)
+    pieces = rng.uniform(0.08, 0.16, (4, 2))
+    return Strip(f"strip {seed}", pieces, rng.uniform(0.75, 0.9) * pieces.sum())
+
+
+def assignments(n: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Part and variant (n,) of n elements made of two parts; one of each that differ by the names
+    of the parts or by their ends."""
+    for rest in product(range(4), repeat=n - 1):
+        ways = np.array([0, *rest])
+        part, variant = ways // 2, ways % 2
+        second = np.flatnonzero(part == 1)
+        if not len(second) or variant[second[0]] == 0:
+            yield part, variant
+
+
+def compared(seed: int, effort: dict[str, Any] | None = None) -> dict[str, Any]:
+    """The search's J and the best of all assignments for one random strip and two parts.
+
+    effort : settings of the stages, default: the usual ones
+
+    Returns J of the search, of the best assignment, and of the direct and the second best one; the
+    optimum is the least of all that was found, the search's own result included.
+    """
+    strip = strip_of(seed)
+    settings = StageSettings(**(effort or {}))
+    found = optimize_kit(
+        [strip], {"linear": 2}, settings=JobSettings(jobs=1, stages=settings, baselines=False)
+    )
+    values = sorted(_all_values(strip))
+    search = found.stages["assigned"].value
+    search = float("inf") if search is None else search
+    best = min(values[0], search)
+    return {
+        "seed": seed,
+        "pieces": strip.n_elements,
+        "assignments": len(values),
+        "J of the search": search,
+        "J of the best": best,
+        "ratio": search / best,
+        "found": bool(search <= best * (1 + _SAME)),
+        "better than all tried": bool(search < values[0] * (1 - _SAME)),
+        "second best ratio": next((v / best for v in values if v > best * (1 + _SAME)), None),
+        "direct ratio": (found.stages["direct"].value or float("inf")) / best,
+    }
+
+
+def _all_values(strip: Strip) -> list[float]:
+    """J of every assignment, its parts at their minimum; infinite where the strip fails."""
+    found = []
+    with DesignPool([strip], 1) as pool:
+        pool.prepare()
+        dataset = Dataset.of_pool(pool, Weights.suiting([strip]))
+        stages = Stages(dataset, {"linear": 2}, StageSettings(assigned_tolerance=1e-6))
+        inputs = stages.inputs()
+        elements = collect(dataset.groups, dataset.parameters)["linear"]
+        limits = elements.kind.bounds(None)
+        for part, variant in assignments(strip.n_elements):
+            labels = Labels(part, variant, np.zeros(len(part)))
+            parts = best_parts(elements, np.full((2, 2), 0.1), labels, *limits)
+            assignment = Assignment(
+                tuple(dataset.groups), (part,), (variant,), len(dataset.parameters)
+            )
+            built = stages.built_from(Kit({"linear": parts}), assignment, inputs, path_steps=3)
+            value = stages.assigned(built, "each").value if built.value is not None else None
+            found.append(float("inf") if value is None else value)
+    return found
