@@ -61,7 +61,7 @@ def _load(file: Path) -> ctypes.CDLL | None:
         ("scatter_blocks", None, (count, count, *[pointer] * 6)),
         ("predict_stress", None, (*[pointer] * 4,)),
         ("largest_forces", None, (*[pointer] * 3,)),
-        ("factorise", integer, (*[pointer] * 4,)),
+        ("factorise", integer, (*[pointer] * 4, count)),
         ("solve", None, (*[pointer] * 5,)),
         ("solve_columns", integer, (*[pointer] * 3, count, *[pointer] * 3, count, *[pointer] * 4)),
         ("multiply_blocks", None, (count, *[pointer] * 3, count, count, *[pointer] * 2)),

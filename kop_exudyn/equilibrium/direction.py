@@ -40,9 +40,9 @@ def factorise_convex(system: System, shift: float = 0.0) -> tuple[float, Border 
     margin in scenes without actuation. Returns the shift that was used and the border (None without
     actuation).
     """
-    base = None
+    base, most = None, 0 if system.constraint is None else 1  # with more it can't be convex
     for _ in range(_MAX_SHIFTS):
-        negative = system.factorise(shift)
+        negative = system.factorise(shift, most)
         border = border_of(system) if negative <= 1 and system.constraint is not None else None
         if is_convex(negative, border):
             if base is not None and system.constraint is None:

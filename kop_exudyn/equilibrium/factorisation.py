@@ -14,6 +14,7 @@ from ..errors import SimulationFailure
 from .block_solve import COLUMNS, Solutions
 from .supernodes import Supernodes, supernodes_of
 
+_STOPPED = 2  # as in compiled/sources/factor.c
 _SINGULAR = "the stiffness is singular: a pivot is exactly zero, as at a bifurcation"
 
 
@@ -22,7 +23,8 @@ class Factorisation(ABC):
 
     pivots : (n,) of the last update, in the order of the elimination; their signs are the matrix's
         inertia (Sylvester), which tells stability
-    singular : whether the last update met an exactly zero pivot: there is nothing to solve with
+    singular : whether the last update met an exactly zero pivot, or was stopped: there is nothing
+        to solve with
     """
 
     def __init__(self) -> None:
@@ -30,9 +32,12 @@ class Factorisation(ABC):
         self.singular = True
 
     @abstractmethod
-    def update(self, upper: sp.csc_matrix) -> int:
+    def update(self, upper: sp.csc_matrix, most: int | None = None) -> int:
         """Factorise (upper triangle, all diagonal entries present); returns the number of
-        non-positive pivots, 1 for a zero one."""
+        non-positive pivots, 1 for a zero one.
+
+        most : stop, with a larger number, once more pivots than this are not positive
+        """
 
     @abstractmethod
     def solve(self, rhs: np.ndarray) -> np.ndarray:
@@ -106,16 +111,23 @@ class SupernodalFactorisation(Factorisation):
         self._kernels = kernels
         self._supernodes: Supernodes | None = None
 
-    def update(self, upper: sp.csc_matrix) -> int:
+    def update(self, upper: sp.csc_matrix, most: int | None = None) -> int:
         if self._supernodes is None or not self._same_pattern(upper):
             self._analyse(upper)
         pivots = np.empty(self._n)
         values = np.ascontiguousarray(upper.data, float)
         status = self._kernels.factorise(
-            self._at, address(values), address(self._panels), address(pivots)
+            self._at,
+            address(values),
+            address(self._panels),
+            address(pivots),
+            self._n if most is None else most,
         )
         if status < 0:
             raise MemoryError("no memory for a factorisation")
+        if status == _STOPPED:
+            self._counted(None)
+            return self._n if most is None else most + 1
         return self._counted(None if status else pivots)
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
@@ -201,7 +213,7 @@ class SparseFactorisation(Factorisation):
         super().__init__()
         self._solver: qdldl.Solver | None = None
 
-    def update(self, upper: sp.csc_matrix) -> int:
+    def update(self, upper: sp.csc_matrix, most: int | None = None) -> int:
         try:
             if self._solver is None:
                 self._solver = qdldl.Solver(upper, upper=True)

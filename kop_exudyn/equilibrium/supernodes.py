@@ -14,6 +14,8 @@ import numpy as np
 import qdldl
 import scipy.sparse as sp
 
+from ..scene.recent import Recent
+
 LANES = 4  # rows below a supernode's diagonal block are padded to a multiple, as in factor.c
 # Time of a supernode in the kernels: nanoseconds, a number to clear, move and add, a multiplication
 _PER_SUPERNODE, _PER_NUMBER, _PER_PRODUCT = 300.0, 1.2, 0.12
@@ -59,7 +61,15 @@ class Supernodes:
 
 
 def supernodes_of(upper: sp.csc_matrix) -> Supernodes:
-    """Analyse a pattern (upper triangle, all diagonal entries present)."""
+    """Analyse a pattern (upper triangle, all diagonal entries present); matrices of one pattern
+    share the result."""
+    return _recent.get(lambda: _analyse(upper), upper.indptr, upper.indices)
+
+
+_recent: Recent[Supernodes] = Recent()
+
+
+def _analyse(upper: sp.csc_matrix) -> Supernodes:
     n = upper.shape[0]
     column = np.repeat(np.arange(n), np.diff(upper.indptr))
     group = _same_neighbours(upper.indices, column, n)

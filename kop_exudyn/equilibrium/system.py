@@ -164,15 +164,18 @@ class System:
         """Generalised stresses (E, 6) of the state assembled last."""
         return self.scene.stiffness * self.strain / self.lengths[:, None]
 
-    def factorise(self, shift: float = 0.0) -> int:
+    def factorise(self, shift: float = 0.0, most: int | None = None) -> int:
         """Factorise the assembled Hessian plus shift times the metric; returns how many pivots are
-        not positive."""
+        not positive.
+
+        most : give up, with nothing to solve with, once more than this aren't
+        """
         self._check_thread()
         begin = perf_counter()
         if shift:
             diagonal = self.values[self.sparsity.diagonal]
             self.values[self.sparsity.diagonal] = diagonal + shift * self.metric
-        negative = self.factorisation.update(self._matrix)
+        negative = self.factorisation.update(self._matrix, most)
         self._constraint_solution = None
         self.number += 1
         if shift:

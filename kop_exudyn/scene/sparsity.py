@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from .recent import Recent
 from .scene import Scene
 
 
@@ -78,7 +79,15 @@ class Sparsity:
 
 
 def sparsity_of(scene: Scene) -> Sparsity:
-    """Find the assembly maps of a scene."""
+    """The assembly maps of a scene; not to be changed, scenes of one topology share them."""
+    structure = element_dofs(scene), scene.pinned, scene.driven.dofs
+    return _recent.get(lambda: _find(scene), *structure, *(term.dofs for term in scene.terms))
+
+
+_recent: Recent[Sparsity] = Recent()
+
+
+def _find(scene: Scene) -> Sparsity:
     n_dofs = scene.n_dofs
     is_driven = np.zeros(n_dofs, bool)
     is_driven[scene.driven.dofs] = True

@@ -14,6 +14,7 @@ from kop_exudyn.equilibrium.factorisation import (
     SupernodalFactorisation,
 )
 from kop_exudyn.equilibrium.supernodes import supernodes_of
+from kop_exudyn.errors import SimulationFailure
 
 needs_kernels = pytest.mark.skipif(library() is None, reason="there are no compiled kernels")
 
@@ -126,3 +127,28 @@ def test_the_same_matrix_gives_the_same_digits():
         factors.update(upper_of(matrix))
     assert np.array_equal(one.pivots, two.pivots)
     assert np.array_equal(one.solve(np.ones(72)), two.solve(np.ones(72)))
+
+
+@pytest.mark.parametrize(
+    "make", [pytest.param(SupernodalFactorisation, marks=needs_kernels), SparseFactorisation]
+)
+def test_more_bad_pivots_than_are_of_use(make):
+    matrix = blocks(8, [6, 1, 6, 6], 0.5)
+    negative = int(np.sum(np.linalg.eigvalsh(matrix) < 0))
+    assert negative > 3
+    factors = make()
+    for most in (0, 1, negative - 1):
+        assert factors.update(upper_of(matrix), most) > most
+    for most in (negative, negative + 1, None):
+        assert factors.update(upper_of(matrix), most) == negative and not factors.singular
+    assert np.allclose(matrix @ factors.solve(np.ones(19)), 1)
+
+
+@needs_kernels
+def test_nothing_is_solved_with_what_was_given_up():
+    matrix = blocks(8, [6, 1, 6, 6], 0.5)
+    factors = SupernodalFactorisation()
+    factors.update(upper_of(matrix), 0)
+    assert factors.singular
+    with pytest.raises(SimulationFailure):
+        factors.solve(np.ones(19))

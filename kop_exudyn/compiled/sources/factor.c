@@ -116,23 +116,23 @@ static int factorise_panel(double *P, int64_t k, int64_t height, double *D, doub
     return 0;
 }
 
-/* Factorise the matrix of these values into panels and pivots D. Returns 0, 1 for a zero pivot, -1
- * without memory. */
-int factorise(const Supernodes *s, const double *values, double *panels, double *D)
+/* Factorise the matrix of these values into panels and pivots D, until more than `most` pivots are
+   not positive. Returns 0, 1 for a zero pivot, 2 when it stopped, -1 without memory. */
+int factorise(const Supernodes *s, const double *values, double *panels, double *D, int64_t most)
 {
     double *stack = malloc(
         sizeof(double) * (s->stack_size + (s->widest + LANES) * PADDED(s->tallest + s->widest)));
     if (!stack)
         return -1;
     double *W = stack + s->stack_size;
-    int64_t top = 0, zero_pivot = 0;
-    int64_t *open = malloc(sizeof(int64_t) * (s->n_supernodes + 1)),
-            n_open = 0; /* supernodes with stacked updates */
+    int64_t top = 0, bad = 0;
+    int status = 0;
+    int64_t n_open = 0, *open = malloc(sizeof(int64_t) * (s->n_supernodes + 1)); /* with updates */
     if (!open) {
         free(stack);
         return -1;
     }
-    for (int64_t t = 0; t < s->n_supernodes && !zero_pivot; t++) {
+    for (int64_t t = 0; t < s->n_supernodes && !status; t++) {
         int64_t k = s->first[t + 1] - s->first[t], m = s->row_start[t + 1] - s->row_start[t];
         int64_t padded = PADDED(m), height = k + padded;
         double *P = panels + s->panel_start[t], *U = stack + top;
@@ -151,8 +151,12 @@ int factorise(const Supernodes *s, const double *values, double *panels, double 
                     column[to[i]] += from[i];
             }
         }
-        zero_pivot = factorise_panel(P, k, height, D + s->first[t], W);
-        if (m) {
+        status = factorise_panel(P, k, height, D + s->first[t], W);
+        for (int64_t j = s->first[t]; j < s->first[t + 1] && !status; j++)
+            bad += !(D[j] > 0);
+        if (!status && bad > most)
+            status = 2;
+        if (m && !status) {
             for (int64_t p = 0; p < k; p++)
                 for (int64_t j = 0; j < m; j++)
                     W[p * padded + j] = P[p * height + k + j] * D[s->first[t] + p];
@@ -164,7 +168,7 @@ int factorise(const Supernodes *s, const double *values, double *panels, double 
     }
     free(open);
     free(stack);
-    return (int)zero_pivot;
+    return status;
 }
 
 /* Solve L D L^T x = b in place, b (n,) in the order of elimination; work (tallest,). */
