@@ -258,6 +258,8 @@ def rescaled(data: Mapping[str, Any], factor: float) -> dict[str, Any]:
     Raises InputError for classes whose designs can't be rescaled.
     """
     class_name = data.get("class")
+    for name in class_names():
+        CLASSES.get(name)  # reading a class's module registers what it has
     if class_name not in _RESCALINGS:
         raise InputError(
             f"designs of this class can't be rescaled (those of {', '.join(sorted(_RESCALINGS))} "
