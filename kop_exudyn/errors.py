@@ -36,11 +36,11 @@ class InputError(ValueError):
             self.message, source=self.source or source, field=self.field, value=self.value
         )
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         return _rebuild_input_error, (self.message, self.source, self.field, self.value)
 
 
-def _rebuild_input_error(message, source, field, value):
+def _rebuild_input_error(message: str, source: Any, field: str | None, value: Any) -> InputError:
     return InputError(message, source=source, field=field, value=value)
 
 
@@ -63,11 +63,11 @@ class SimulationFailure(RuntimeError):
             self.reason, where=where if self.where is None else f"{where}: {self.where}"
         )
 
-    def __reduce__(self):
+    def __reduce__(self) -> tuple[Any, ...]:
         return _rebuild_failure, (self.reason, self.where)
 
 
-def _rebuild_failure(reason, where):
+def _rebuild_failure(reason: str, where: str | None) -> SimulationFailure:
     return SimulationFailure(reason, where=where)
 
 

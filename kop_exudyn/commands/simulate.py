@@ -56,9 +56,10 @@ def run(args: argparse.Namespace) -> int:
     from ..errors import SimulationFailure
     from ..files.json_files import to_json
     from ..io.designs import load_design
+    from ..structures.loads import LoadCase
 
     design = load_design(args.design)
-    own = ()
+    own: tuple[LoadCase, ...] = ()
     if args.gravity is not None:
         own = (replace(design.loads, gravity=_gravity(design, args)),)
     try:

@@ -158,7 +158,7 @@ class _Decision:
             self._link(a, c)
             self._link(b, d)
             self._hinge(a, b)
-        pairs = sorted((self._turn(*pair), *pair) for pair in sized[2])
+        pairs = sorted((self._turn(a, b), a, b) for a, b in sized[2])
         for turn, a, b in pairs:
             if turn > _SHARP:
                 self._hinge(a, b)

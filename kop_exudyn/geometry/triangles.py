@@ -96,7 +96,7 @@ class TriangleSurface:
         return Closest(projected, self.normals[faces], faces, squared, features, edges)
 
     @cached_property
-    def _tree(self):
+    def _tree(self) -> Any:
         import igl
 
         tree = igl.AABB()

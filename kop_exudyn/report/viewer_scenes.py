@@ -6,6 +6,7 @@ import logging
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -188,7 +189,7 @@ class _Drawing:
             ),
         )
 
-    def _number(self, piece) -> int:
+    def _number(self, piece: Any) -> int:
         """The part's place in `viewer_parts`, -1 for none."""
         if piece is None or self.parts is None:
             return -1

@@ -143,7 +143,9 @@ def rest_strain_derivative(
     return -stiffness * strain, -stiffness
 
 
-def _derivative_of_product(phi, s, p, c, c_s) -> np.ndarray:
+def _derivative_of_product(
+    phi: np.ndarray, s: np.ndarray, p: np.ndarray, c: np.ndarray, c_s: np.ndarray
+) -> np.ndarray:
     """d(A(phi) p)/dphi (n, 3, 3)."""
     along = _dot(phi, p)
     return (
@@ -153,7 +155,9 @@ def _derivative_of_product(phi, s, p, c, c_s) -> np.ndarray:
     )
 
 
-def _gradient_map(g, phi, s, c, c_s) -> np.ndarray:
+def _gradient_map(
+    g: np.ndarray, phi: np.ndarray, s: np.ndarray, c: np.ndarray, c_s: np.ndarray
+) -> np.ndarray:
     """N (n, 3, 3) with N v = d(g.A(phi) v)/dphi. For A^T in place of A it is N - hat(g)."""
     along = _dot(g, phi)
     return (
@@ -163,7 +167,17 @@ def _gradient_map(g, phi, s, c, c_s) -> np.ndarray:
     )
 
 
-def _geometric(R0T, p, phi, s, A, coefficients, p_x, phi_x, sigma) -> np.ndarray:
+def _geometric(
+    R0T: np.ndarray,
+    p: np.ndarray,
+    phi: np.ndarray,
+    s: np.ndarray,
+    A: np.ndarray,
+    coefficients: tuple[np.ndarray, np.ndarray, np.ndarray],
+    p_x: np.ndarray,
+    phi_x: np.ndarray,
+    sigma: np.ndarray,
+) -> np.ndarray:
     """G(sigma) (n, 12, 12): second variations of u and phi contracted with sigma."""
     c, c_s, c_ss = coefficients
     su, sphi = sigma[:, :3], sigma[:, 3:]

@@ -145,7 +145,9 @@ class LinearActuators(SceneTerm):
         return n_t, n_b, difference / length[:, None], length, gap
 
     @staticmethod
-    def _spacing_derivatives(axis, length, gap, h) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _spacing_derivatives(
+        axis: np.ndarray, length: np.ndarray, gap: np.ndarray, h: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """h = d.u/|d|: h_d (m, 3), h_dd and h_du (m, 3, 3), with d the difference of the
         normals."""
         across = gap - h[:, None] * axis

@@ -253,7 +253,12 @@ class SceneBuilder:
         )
 
     def _prescriptions(
-        self, n_bodies, angles, parameter, factor, prescribed
+        self,
+        n_bodies: int,
+        angles: np.ndarray,
+        parameter: np.ndarray,
+        factor: np.ndarray,
+        prescribed: np.ndarray,
     ) -> tuple[Driven, np.ndarray]:
         """Driven unknowns and the mask of pinned ones; a prescribed hinge without parameter is
         pinned."""

@@ -223,7 +223,17 @@ def _descend(
     )
 
 
-def _descend_numpy(q, slope, hessian, indices, candidates, choice, least, n_ways, left) -> int:
+def _descend_numpy(
+    q: np.ndarray,
+    slope: np.ndarray,
+    hessian: np.ndarray,
+    indices: np.ndarray,
+    candidates: np.ndarray,
+    choice: np.ndarray,
+    least: float,
+    n_ways: int,
+    left: np.ndarray,
+) -> int:
     total, changed = 0, 1
     while changed:
         changed = 0

@@ -197,7 +197,11 @@ def _one_sided(
 
 
 def _certificate(
-    result, lower, upper, constraints: LinearConstraints, origin: list[tuple[int, str]]
+    result: Any,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    constraints: LinearConstraints,
+    origin: list[tuple[int, str]],
 ) -> str:
     """The limits that exclude each other, from the multipliers of phase one."""
     found = []

@@ -134,7 +134,9 @@ class QPSolver:
             x, y, z, raw.status, residuals, solver, raw.iterations, time.perf_counter() - began
         )
 
-    def _attempts(self, qp: ScaledQP, start) -> tuple[RawSolution, Residuals, str]:
+    def _attempts(
+        self, qp: ScaledQP, start: tuple[np.ndarray, np.ndarray, np.ndarray]
+    ) -> tuple[RawSolution, Residuals, str]:
         nothing = Residuals(np.nan, np.nan, np.nan)
         inverse = factorise_positive(qp.H, qp.border)
         # OSQP would only print so, and only at set-up
@@ -175,7 +177,7 @@ def _without_void_multipliers(qp: ScaledQP, raw: RawSolution) -> RawSolution:
     """Multipliers of infinite limits set to zero: what rounding leaves there then shows up in the
     stationarity."""
 
-    def clean(multiplier, low, high):
+    def clean(multiplier: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         return np.clip(
             multiplier,
             np.where(np.isfinite(low), -np.inf, 0.0),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import osqp
@@ -177,7 +178,7 @@ class OsqpBackend:
             adaptive_rho_interval=50,
             check_termination=25,
         )
-        self._solver: osqp.OSQP | None = None
+        self._solver: Any = None  # osqp.OSQP, which is untyped
         self._pattern: tuple[np.ndarray, ...] = ()
         self._rho_moved = False
         self.setups = 0
@@ -201,7 +202,15 @@ class OsqpBackend:
         """Set up anew next time: after a failure OSQP's factorisation may be void."""
         self._solver = None
 
-    def _load(self, upper, g, rows, low, high, limited) -> None:
+    def _load(
+        self,
+        upper: sp.csc_matrix,
+        g: np.ndarray,
+        rows: sp.csc_matrix,
+        low: np.ndarray,
+        high: np.ndarray,
+        limited: np.ndarray,
+    ) -> None:
         """Set up for a new pattern, else update; the penalty as at the start."""
         pattern = (upper.indptr, upper.indices, rows.indptr, rows.indices, limited)
         known = len(self._pattern) == len(pattern)
@@ -221,7 +230,14 @@ class OsqpBackend:
         self._pattern, self._rho_moved = pattern, False
         self.setups += 1
 
-    def _run(self, rows, low, high, x, dual):
+    def _run(
+        self,
+        rows: sp.csc_matrix,
+        low: np.ndarray,
+        high: np.ndarray,
+        x: np.ndarray,
+        dual: np.ndarray,
+    ) -> Any:
         """Iterate, then polish. Polishing is asked for only where a limit is active: OSQP prints a
         line otherwise."""
         self._solver.warm_start(x=x, y=dual)
@@ -241,7 +257,7 @@ class OsqpBackend:
         return result
 
 
-def _unpack(result, limited: np.ndarray, m: int, n: int) -> RawSolution:
+def _unpack(result: Any, limited: np.ndarray, m: int, n: int) -> RawSolution:
     code = result.info.status_val
     status = "solved" if code in _SOLVED else "infeasible" if code in _INFEASIBLE else "failed"
     status = "unbounded" if code in _UNBOUNDED else status
