@@ -25,7 +25,7 @@ from ..scene.state import State
 from .direction import border_of, bordered_solve, factorise_convex, is_convex, shift_unit
 from .equilibria import Equilibrium, Start
 from .softened import softened
-from .stability import softest_mode
+from .stability import rounding_of, softest_mode, zero_mode
 from .system import Energy, System
 
 log = logging.getLogger(__name__)
@@ -34,6 +34,10 @@ _QUICK = 2  # headway within so many further steps: the steps may grow again
 _MAX_RETURNS = 8  # to the best state, before energy descent takes over
 _FLOOR_FACTOR = 30.0
 _BENT_TOO_FAR = 2.5  # rad from one end of an element to the other; at pi its strain measure ends
+_MECHANISM = (
+    "a neutral equilibrium (a mechanism, or a bifurcation point): a motion meets no resistance, "
+    "the softest mode's eigenvalue {:.1e} is zero to rounding"
+)
 # Shifted steps in a row, and the relative residual, after which an iteration is taken to be
 # creeping up to a saddle.
 _LINGERING, _NEAR = 20, 1e-2
@@ -178,6 +182,8 @@ class _Run:
             negative = self.system.factorise()
             border = border_of(self.system)
             if is_convex(negative, border):
+                if (eigenvalue := zero_mode(self.system, border)) is not None:
+                    raise SimulationFailure(_MECHANISM.format(eigenvalue))
                 break
             self.assembled = None
             self._leave_saddle(energy)
@@ -342,6 +348,8 @@ class _Run:
         if self.escapes > self.options.escapes:
             raise SimulationFailure(f"still unstable after leaving {self.escapes - 1} saddles")
         softest = softest_mode(self.system)
+        if softest.eigenvalue > -rounding_of(self.system):
+            raise SimulationFailure(_MECHANISM.format(softest.eigenvalue))
         mode = softest.vector
         side = self.options.side
         if (

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from .direction import bordered_solve, factorise_convex
+from .direction import Border, bordered_solve, factorise_convex
 from .equilibria import Equilibrium
 from .system import System
+
+_ROUNDING = 1e3
 
 
 @dataclass(frozen=True)
@@ -41,8 +43,7 @@ def softest_mode(system: System, equilibrium: Equilibrium | None = None) -> Soft
     inverse = spla.LinearOperator(
         (n, n), matvec=lambda v: root * bordered_solve(system, border, root * v.ravel())[0]
     )
-    # fixed, without symmetry, so that the result is reproducible
-    start = np.sin(np.arange(1, n + 1) * 0.7390851)
+    start = _without_symmetry(n)
     if n < 4:
         dense = np.column_stack([inverse.matvec(e) for e in np.eye(n)])
         values, vectors = np.linalg.eigh(0.5 * (dense + dense.T))
@@ -53,6 +54,37 @@ def softest_mode(system: System, equilibrium: Equilibrium | None = None) -> Soft
     vector = vector / root
     scale = np.abs(vector[system.is_rotation]).max(initial=0.0) or np.abs(vector).max()
     return SoftestMode(float(1 / largest - shift), vector / scale)
+
+
+def rounding_of(system: System) -> float:
+    """Eigenvalue below which a mode of the Hessian assembled last is without stiffness.
+
+    Rounding leaves an error of about eps times the largest eigenvalue, which is that of a stretch.
+    The softest modes of structures that stand, of up to ten thousand unknowns, are 1e5 times above
+    that and more; mechanisms are at it.
+    """
+    diagonal = np.abs(system.values[system.sparsity.diagonal]) / system.metric
+    return float(_ROUNDING * np.finfo(float).eps * diagonal.max(initial=0.0))
+
+
+def zero_mode(system: System, border: Border | None) -> float | None:
+    """The eigenvalue of a mode without stiffness, None where there is none, of a Hessian that is
+    positive definite as far as its pivots tell.
+
+    One step of inverse iteration: where rounding alone makes a stiffness positive, all others are
+    so far away that the Rayleigh quotient is the eigenvalue.
+    """
+    if not system.n_unknowns:
+        return None
+    weighted = system.metric * _without_symmetry(system.n_unknowns)
+    mode, _ = bordered_solve(system, border, weighted)
+    eigenvalue = float(mode @ weighted) / float(mode @ (system.metric * mode))
+    return eigenvalue if not eigenvalue > rounding_of(system) else None
+
+
+def _without_symmetry(n: int) -> np.ndarray:
+    """A fixed vector (n,) that no symmetric mode is orthogonal to: results are reproducible."""
+    return np.sin(np.arange(1, n + 1) * 0.7390851)
 
 
 def stiffness_matrix(system: System, equilibrium: Equilibrium | None = None) -> sp.csc_matrix:
