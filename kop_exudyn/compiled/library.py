@@ -65,6 +65,7 @@ def _load(file: Path) -> ctypes.CDLL | None:
         ("solve", None, (*[pointer] * 5,)),
         ("solve_columns", integer, (*[pointer] * 3, count, *[pointer] * 3, count, *[pointer] * 4)),
         ("multiply_blocks", None, (count, *[pointer] * 3, count, count, *[pointer] * 2)),
+        ("actuate", ctypes.c_double, (count, *[pointer] * 9)),
         ("rasterise", None, (count, *[pointer] * 3, count, count, *[pointer] * 2)),
         (
             "descend",

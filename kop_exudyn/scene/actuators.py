@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from ..compiled.library import address, library
 from ..errors import InputError
 from .state import State
 from .terms import SceneTerm
@@ -48,7 +49,7 @@ class LinearActuators(SceneTerm):
         extension: float = 1.0,
         shear: float = 1.0,
     ):
-        self.top, self.bottom = np.array(top, int).reshape(-1), np.array(bottom, int).reshape(-1)
+        self.top, self.bottom = (np.array(bodies, np.int64).reshape(-1) for bodies in (top, bottom))
         m = len(self.top)
         self.spacing = np.array(np.broadcast_to(spacing, m), float)
         self.weight = np.array(np.broadcast_to(weight, m), float)
@@ -99,6 +100,27 @@ class LinearActuators(SceneTerm):
 
     def gradient_hessian(self, state: State) -> tuple[float, np.ndarray, np.ndarray]:
         """Energy, gradients (m, 12) and Hessians (m, 12, 12), in (dx_t, w_t, dx_b, w_b)."""
+        m, kernels = len(self.top), library()
+        if kernels is None:
+            return self._gradient_hessian(state)
+        g, H = np.empty((m, 12)), np.empty((m, 12, 12))
+        factors = np.array([self.alignment, self.extension, self.shear], float)
+        numbers = [
+            np.ascontiguousarray(a, float)
+            for a in (self.spacing, self.weight, factors, state.positions, state.rotations)
+        ]
+        energy = kernels.actuate(
+            m,
+            address(self.top, np.int64),
+            address(self.bottom, np.int64),
+            *[address(a) for a in numbers],
+            address(g),
+            address(H),
+        )
+        return energy, g, H
+
+    def _gradient_hessian(self, state: State) -> tuple[float, np.ndarray, np.ndarray]:
+        """The same in NumPy."""
         m = len(self.top)
         n_t, n_b, axis, length, gap = self._geometry(state)
         h = _dot(axis, gap)

@@ -71,6 +71,7 @@ class CompiledAssembly(RodAssembly):
         rods = _Rods(len(scene.elements))
         for name, array in self._arrays.items():
             setattr(rods, name, address(array, array.dtype.type))
+        self._targets = address(self.gradient), address(self.values)
         self._rods = rods  # with its arrays, whose addresses it has
         self._at = ctypes.addressof(rods)
 
@@ -98,8 +99,7 @@ class CompiledAssembly(RodAssembly):
             address(slots, np.int32),
             address(g),
             None if H is None else address(H),
-            address(self.gradient),
-            address(self.values),
+            *self._targets,
         )
 
     def predict_stress(self, lengths: np.ndarray, increment: np.ndarray) -> None:

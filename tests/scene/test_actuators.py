@@ -19,6 +19,9 @@ def random_state(seed: int, n: int = 8) -> State:
     return State(rng.normal(size=(n, 3)), exp_so3(turn), rng.normal(size=2))
 
 
+pytestmark = pytest.mark.usefixtures("kernels")
+
+
 def actuators(**options) -> LinearActuators:
     return LinearActuators([0, 2, 4], [1, 3, 5], 0.7, [0.5, 1.0, 2.0], **options)
 

@@ -257,8 +257,9 @@ void assemble_rods(const Rods *rods, int order, int mixed, const double *positio
                     if (*slots >= 0)
                         rods->values[*slots] += H14[a][b][l];
             double *out = rods->strain_displacement + 84 * e[l];
-            for (int k = 0; k < 84; k++)
-                out[k] = B14[k / 14][k % 14][l];
+            for (int r = 0; r < 6; r++)
+                for (int c = 0; c < 14; c++)
+                    *out++ = B14[r][c][l];
         }
     }
     energies[0] = elastic;

@@ -57,7 +57,7 @@ class Deployment:
     angle: float = 1e-3
     turn: float = 2.0
     halvings: int = 4
-    tolerance: float = 1e-5
+    tolerance: float = 1e-3
 
     def path(self, gentle: bool = False) -> list[Stage]:
         """The stages in order, the final state last; `gentle` begins with weaker loads."""

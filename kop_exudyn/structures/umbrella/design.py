@@ -157,7 +157,11 @@ class Umbrella(Design):
         on its pins. `escapes` of the equilibrium counts the unstable states that were left on the
         way: where there are any, the mesh may open to another shape. Raises SimulationFailure.
         """
-        q = self.parameters if q is None else np.asarray(q, float)
+        if q is None:
+            return {"deployed": self.deployed}  # solved for once, whoever asks
+        return {"deployed": self._opened(np.asarray(q, float))}
+
+    def _opened(self, q: np.ndarray) -> Equilibrium:
         try:
             *done, final = follow(*self._path(q), self.deployment, self.name)
         except SimulationFailure as failure:
@@ -165,7 +169,7 @@ class Umbrella(Design):
                 *done, final = follow(*self._path(q, gentle=True), self.deployment, self.name)
             except SimulationFailure:
                 raise failure from None
-        return {"deployed": final.after(*done)}
+        return final.after(*done)
 
     def _path(self, q: np.ndarray, gentle: bool = False) -> tuple[State, list[Stage], Solver]:
         """The compact state as near to the target as it can be, the stages, and what solves one."""
@@ -232,7 +236,7 @@ class Umbrella(Design):
     @cached_property
     def deployed(self) -> Equilibrium:
         """The input design's final state."""
-        return self.deploy()["deployed"]
+        return self._opened(self.parameters)
 
     @cached_property
     def target(self) -> Target:
