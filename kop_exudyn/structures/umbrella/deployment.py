@@ -51,7 +51,7 @@ class Deployment:
     """
 
     stages: int = 4
-    weights: tuple[float, ...] = (1e-5, 1e-3, 1e-1, 1.0)
+    weights: tuple[float, ...] = (1e-4, 1e-2, 1.0)
     attraction: float = 0.1
     share: float = 0.99999
     angle: float = 1e-3
