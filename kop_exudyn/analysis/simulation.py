@@ -19,6 +19,7 @@ from ..structures.base import Design
 from ..structures.deviation import fit_summary
 from ..structures.fitting import FitResult, TargetFitting
 from ..structures.loads import LoadCase
+from ..structures.plausibility import design_doubts
 from ..structures.strength import strength_summary
 from .loading import LoadedState, loaded_state
 
@@ -137,7 +138,12 @@ def simulate(design: Design, loads: LoadCase | None = None) -> SimulationResult:
             equilibria[name] = refine(design.systems[name], equilibrium)
             confirmations[name] = ExudynModel(design.scene(name)).confirm(equilibria[name])
     except SimulationFailure as failure:
-        raise failure.within(design.name) from None
+        doubts = "".join(f"; {doubt}" for doubt in design_doubts(design))
+        raise SimulationFailure(failure.reason + doubts, where=failure.where).within(
+            design.name
+        ) from None
+    for doubt in design_doubts(design):
+        log.warning("%s: %s", design.name, doubt)
     role = design.fitted_role.name
     joints = design.report_positions(confirmations[role].state)
     fit = TargetFitting(target)(confirmations[role].state.positions[design.joints])

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ..structures.base import Design
+    from ..structures.loads import LoadCase
     from ..units import Units
 
 HELP = "deploy one design and say how well it fits its target"

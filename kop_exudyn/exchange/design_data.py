@@ -10,6 +10,8 @@ import numpy as np
 
 from ..files.documents import check_schema
 from ..io.designs import DESIGN_VERSION
+from ..rods.sections import material_from_dict
+from ..structures.plausibility import material_doubts, section_doubt
 from ..units import Units
 from .frames import Frame
 
@@ -106,37 +108,13 @@ def _head(kind: str, name: str, rods: Rods) -> dict[str, Any]:
     }
 
 
-def section_doubts(rods: Rods, spans: np.ndarray) -> list[str]:
+def rod_doubts(rods: Rods, spans: np.ndarray) -> list[str]:
     """What looks as if it were given in other units than the net, in words.
 
     spans : the lengths between neighbouring joints
     """
-    found = []
-    length = "" if rods.units is None else f" {rods.units.length}"
     sides = [float(rods.section[name]) for name in ("width", "height")]
-    median = float(np.median(spans))
-    if max(sides) > 0.5 * median:
-        found.append(
-            f"the section of {sides[0]:g} x {sides[1]:g}{length} is thick beside spans of "
-            f"{median:.3g}{length}: is it in the net's unit (--scale, --unit)?"
-        )
-    elif max(sides) < 2e-4 * median:
-        found.append(
-            f"the section of {sides[0]:g} x {sides[1]:g}{length} is very thin beside spans of "
-            f"{median:.3g}{length}: is it in the net's unit (--scale, --unit)?"
-        )
-    if rods.units is None:
-        return found
-    young, density = rods.material["young"], rods.material.get("density")
-    modulus = rods.units.stress_si(young)
-    if not 1e5 <= modulus <= 2e12:
-        found.append(
-            f"a Young's modulus of {young:g} is {modulus:.3g} Pa in {rods.units}: is it in these "
-            "units?"
-        )
-    if density is not None and not 1.0 <= rods.units.density_si(density) <= 3e4:
-        found.append(
-            f"a density of {density:g} is {rods.units.density_si(density):.3g} kg/m³ in "
-            f"{rods.units}: is it in these units?"
-        )
-    return found
+    doubt = section_doubt(sides, spans, rods.units)
+    return ([doubt] if doubt else []) + material_doubts(
+        [material_from_dict(rods.material)], rods.units
+    )

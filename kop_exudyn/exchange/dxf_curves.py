@@ -51,9 +51,9 @@ def dxf_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
     known = {layer for _, layer, _ in entities} | {layer.dxf.name for layer in document.layers}
     for layer in layers:
         if layer.lower() not in {name.lower() for name in known}:
-            there = sorted({layer for _, layer, _ in entities})
+            used = sorted({layer for _, layer, _ in entities})
             raise InputError(
-                f"no such layer (there are {', '.join(there) or 'none'})",
+                f"no such layer (there are {', '.join(used) or 'none'})",
                 field="layer",
                 value=layer,
             )

@@ -16,7 +16,7 @@ from ..geometry.mesh_surface import MeshSurface, load_mesh_surface
 from ..structures.base import design_from_dict
 from ..units import LENGTHS, Units
 from .curve_files import read_drawing
-from .design_data import Rods, c_shell_data, grid_data, mesh_target, section_doubts
+from .design_data import Rods, c_shell_data, grid_data, mesh_target, rod_doubts
 from .drawing import Drawing, Finding
 from .drawn_networks import DrawnNetwork, ReadingOptions, drawn_network
 from .space_nets import surface_through, with_heights_checked
@@ -150,10 +150,10 @@ def _doubts(drawn: DrawnNetwork, rods: Rods) -> list[Finding]:
     spans = np.concatenate([strand.lengths for strand in drawn.network.strands])
     if not len(spans):
         return []
-    doubts = section_doubts(rods, spans)
+    doubts = rod_doubts(rods, spans)
     thickest = max(float(rods.section[side]) for side in ("width", "height"))
     if thickest > float(np.median(spans)):
-        raise InputError(doubts[0], field="--section")
+        raise InputError(f"{doubts[0]} (--scale, --unit)", field="--section")
     return [Finding("suspicious", text) for text in doubts]
 
 
@@ -173,6 +173,10 @@ def _check(
             grid_on(mesh, data)
     except InputError as error:
         named = drawn.named(error)
+        for field in ("surface", "target"):  # files of their own
+            if named.field == f"{field}.file" and "file" in data.get(field, {}):
+                file = out.parent / data[field]["file"]
+                raise InputError(named.message, source=os.path.relpath(file)) from None
         raise InputError(named.message, field=named.field, value=named.value) from None
 
 

@@ -21,7 +21,7 @@ left.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -154,11 +154,11 @@ class _Decision:
         """Decide everywhere, see the module."""
         sized = {n: [group for group in self.groups if len(group) == n] for n in (2, 3, 4)}
         for group in sized[4]:
-            a, b, c, d = self._around(group)
-            self._link(a, c)
-            self._link(b, d)
-            self._hinge(a, b)
-        pairs = sorted((self._turn(a, b), a, b) for a, b in sized[2])
+            first, second, third, fourth = self._around(group)
+            self._link(first, third)
+            self._link(second, fourth)
+            self._hinge(first, second)
+        pairs = self._by_turn(sized[2])
         for turn, a, b in pairs:
             if turn > _SHARP:
                 self._hinge(a, b)
@@ -171,10 +171,14 @@ class _Decision:
     def by_turns(self) -> None:
         """Link all ends that turn little, each at most once, the straightest first."""
         pairs = [pair for group in self.groups for pair in combinations(group, 2)]
-        for turn, a, b in sorted((self._turn(*pair), *pair) for pair in pairs):
+        for turn, a, b in self._by_turn(pairs):
             free = self.ends[a] not in self.links and self.ends[b] not in self.links
             if free and turn <= _LARGEST_TURN:
                 self._link(a, b)
+
+    def _by_turn(self, pairs: Iterable[Sequence[int]]) -> list[tuple[float, int, int]]:
+        """Pairs of ends with their turns, the straightest first."""
+        return sorted((self._turn(a, b), a, b) for a, b in pairs)
 
     def tips(self) -> list[End]:
         """One of the ends at each place where two ends meet and aren't linked."""
@@ -187,7 +191,7 @@ class _Decision:
     def _ranked(self, group: list[int]) -> tuple[list[tuple[float, int, int]], list[int]]:
         """The pairs of three ends, the straightest first, so that clear cases sort before others:
         by how much straighter the first pair is than the second."""
-        pairs = sorted((self._turn(a, b), a, b) for a, b in combinations(group, 2))
+        pairs = self._by_turn(combinations(group, 2))
         lead = pairs[0][0] - pairs[1][0]
         return [(lead, -1, -1), *pairs], group
 

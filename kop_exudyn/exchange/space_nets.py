@@ -13,7 +13,7 @@ from .drawn_networks import DrawnNetwork
 
 _CELLS = 40  # of the surface's mesh, along each side
 _MARGIN = 0.08  # of the plan's size, by which the mesh goes beyond the net
-_NEIGHBOURS = 60  # points that shape the surface at a place
+_MOST_POINTS = 700  # that the surface is put through: one dense system of equations
 _APART = 0.02  # of the size: curves that cross in plan and are farther apart pass each other
 _NOTED = 1e-3  # of the size: such distances are worth a word
 UPS = {(0, 1): "z", (2, 0): "y", (1, 2): "x"}
@@ -35,9 +35,7 @@ def surface_through(drawn: DrawnNetwork) -> tuple[np.ndarray, np.ndarray, str]:
     heights = local[kept, 2]
     centre, size = plan.mean(axis=0), float(np.linalg.norm(np.ptp(plan, axis=0)))
     near = _thinned((plan - centre) / size)
-    spline = RBFInterpolator(
-        (plan[near] - centre) / size, heights[near], neighbors=min(_NEIGHBOURS, len(near))
-    )
+    spline = RBFInterpolator((plan[near] - centre) / size, heights[near])
     low, high = plan.min(axis=0) - _MARGIN * size, plan.max(axis=0) + _MARGIN * size
     u, v = (np.linspace(a, b, _CELLS + 1) for a, b in zip(low, high))
     grid = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -104,6 +102,12 @@ def _densely(points: np.ndarray, closed: bool) -> np.ndarray:
     return spline(np.append(inner, t[-1]))
 
 
-def _thinned(plan: np.ndarray, step: float = 2e-3) -> np.ndarray:
-    """Numbers of points (n, 2) no two of which share a cell of a fine grid."""
-    return np.sort(np.unique(np.round(plan / step).astype(int), axis=0, return_index=True)[1])
+def _thinned(plan: np.ndarray) -> np.ndarray:
+    """Numbers of points (n, 2) no two of which share a cell of a grid, as fine as it can be."""
+    step = 2e-3
+    while True:
+        cells = np.round(plan / step).astype(int)
+        kept = np.sort(np.unique(cells, axis=0, return_index=True)[1])
+        if len(kept) <= _MOST_POINTS:
+            return kept
+        step *= 1.3

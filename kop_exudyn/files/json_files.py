@@ -16,6 +16,9 @@ from .files import read_bytes, write_text
 
 # Our documents are at most ten levels deep; this is short of what would exhaust Python's stack.
 MAX_DEPTH = 100
+# Of the text, unpacked: the largest released umbrella meshes have a tenth of it, and reading takes
+# ten times as much memory.
+SIZE_LIMIT = 64 * 2**20
 
 # An innermost list without strings, as json.dumps spreads it over lines.
 _FLAT_LIST = re.compile(r'\[\n\s+([^\[\]{}"]*?)\n\s*\]')
@@ -27,9 +30,9 @@ def read_json(path: str | Path) -> Any:
 
     Raises InputError for unreadable files, for bytes that aren't UTF-8 and for what Python's reader
     would let pass: NaN and Infinity, numbers beyond double precision's range, a key twice in one
-    object, excessive nesting.
+    object, excessive nesting; and for texts of more than 64 MB.
     """
-    content = read_bytes(path)
+    content = read_bytes(path, SIZE_LIMIT)
     try:
         text = content.decode("utf-8-sig")  # some editors start a file with a byte-order mark
     except UnicodeDecodeError as error:

@@ -34,8 +34,8 @@ def free_turns(network: CurveNetwork) -> np.ndarray:
         pins[0, rows, 3 * lath] = pins[1, rows, 3 * lath + 1] = sign
         pins[0, rows, 3 * lath + 2] = -sign * arms[:, 1]
         pins[1, rows, 3 * lath + 2] = sign * arms[:, 0]
-    rows_of_pins = pins.reshape(2 * m, 3 * n)
-    values, vectors = np.linalg.eigh(rows_of_pins.T @ rows_of_pins)
+    rigidity = pins.reshape(2 * m, 3 * n)
+    values, vectors = np.linalg.eigh(rigidity.T @ rigidity)
     motions = vectors[:, values <= _FREE * values[-1]]
     first, second = network.pairs.T
     turns = motions[3 * second + 2] - motions[3 * first + 2]

@@ -69,7 +69,7 @@ def without_empty(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, 
     Where a face's middle corner lies on its longest side, the neighbour across that side is cut in
     two there, so that no slit stays open.
     """
-    left_out = int(len(faces) - np.count_nonzero(_distinct(faces)))
+    left_out = len(faces) - int(np.count_nonzero(_distinct(faces)))
     faces = faces[_distinct(faces)]
     for _ in range(_MOST_CUTS):
         low, corner = _heights(vertices, faces)

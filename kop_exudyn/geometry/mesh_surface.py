@@ -51,7 +51,12 @@ class MeshSurface(Surface):
         )
         area = _signed_areas(flat, self.mesh.faces)
         if not ((area > 0).all() or (area < 0).all()):
-            hint = "; try the conformal chart" if chart == "plane" else ""
+            hint = (
+                '; take "chart": "conformal", at import --chart conformal with the curves drawn in '
+                "space on the surface"
+                if chart == "plane"
+                else ""
+            )
             raise InputError(
                 "the mesh folds over in this chart" + hint, field="surface.chart", value=chart
             )

@@ -22,6 +22,7 @@ from ..structures.base import Design
 from .designs import design_files, load_all, select_among
 
 STUDY_VERSION = 1
+_SIZE_LIMIT = 4 * 2**20  # bytes: a study is a page of text
 STUDY_SUFFIX = ".toml"
 
 
@@ -120,11 +121,13 @@ def _from_file(path: Path) -> Study:
 
 def _read_toml(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(read_bytes(path).decode("utf-8-sig"))
+        return tomllib.loads(read_bytes(path, _SIZE_LIMIT).decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise InputError(f"not UTF-8 text (byte {error.start})", source=path) from None
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"not TOML: {error}", source=path) from None
+    except ValueError:  # an integer of thousands of digits
+        raise InputError("contains a number with too many digits", source=path) from None
 
 
 def _files(entries: Sequence[str | Mapping[str, Any]], path: Path) -> dict[Path, float]:
