@@ -57,7 +57,6 @@ def run(args: argparse.Namespace) -> int:
     from ..errors import SimulationFailure
     from ..files.json_files import to_json
     from ..io.designs import load_design
-    from ..structures.loads import LoadCase
 
     design = load_design(args.design)
     own: tuple[LoadCase, ...] = ()
