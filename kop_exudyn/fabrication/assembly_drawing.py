@@ -16,16 +16,17 @@ from pathlib import Path
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from scipy.spatial import cKDTree
 
 from ..drawing.colours import kit_colours
 from ..drawing.labels import Label, place
 from ..drawing.style import FAINT, INK, QUIET, save_figure, style
 from ..files.files import file_stem, make_folder
-from ..kit.kinds import part_kind
+from ..kit.kinds import has_joint, part_kind
 from ..scene.state import State
-from .blanks import has_joint
 from .lamellas import UPPER, Lamellas
 from .options import millimetres
 from .paper import SCALES, Book, fitting_scale, scale_name
@@ -33,6 +34,7 @@ from .pieces import PartsList, Piece
 from .placement import PlacedPieces
 
 _SIDE_ROOM = 9.0  # mm that the median side is long on paper, at least: room for its label
+_CELL_ROOM = 6.0  # mm between the middles of neighbouring cells, at least
 _BESIDE = 1.7  # mm from a rod's axis to the middle of the text beside it
 _GAP = 1.1  # mm on either side of a crossing in which the lower rod isn't drawn
 _ROD = 2.0  # points
@@ -49,6 +51,7 @@ class AssemblyDrawing:
     parts, placed : what is drawn
     lines : (k, 2) nodes of every rod piece
     joints (n, 2) ; corners : places by parameter
+    cells (n_cells, 3, 2) : plates, of designs whose parts are cells
     """
 
     parts: PartsList
@@ -56,6 +59,11 @@ class AssemblyDrawing:
     lines: list[np.ndarray]
     joints: np.ndarray
     corners: dict[int, np.ndarray]
+    cells: np.ndarray
+
+    @cached_property
+    def _found(self) -> dict[float, tuple[list[Label], list[np.ndarray], int]]:
+        return {}
 
     @property
     def name(self) -> str:
@@ -64,7 +72,7 @@ class AssemblyDrawing:
     @cached_property
     def box(self) -> np.ndarray:
         """(2, 2) lowest and highest x, y."""
-        points = np.concatenate(self.lines)
+        points = np.concatenate([*self.lines, self.cells.reshape(-1, 2)])
         return np.stack([points.min(axis=0), points.max(axis=0)])
 
     @cached_property
@@ -74,8 +82,12 @@ class AssemblyDrawing:
     @cached_property
     def scale(self) -> float:
         """The smallest standard drawing in which every label finds a free place."""
-        sides = [float(np.linalg.norm(line[-1] - line[0])) for line in self.lines]
-        fitting = [s for s in SCALES if np.median(sides) / s >= _SIDE_ROOM] or [SCALES[0]]
+        if len(self.cells):
+            middles = self.cells.mean(axis=1)
+            room, least = cKDTree(middles).query(middles, k=[min(2, len(middles))])[0], _CELL_ROOM
+        else:
+            room, least = [np.linalg.norm(line[-1] - line[0]) for line in self.lines], _SIDE_ROOM
+        fitting = [s for s in SCALES if np.median(room) / s >= least] or [SCALES[0]]
         crowded: dict[float, int] = {}
         for scale in reversed(fitting):
             crowded[scale] = self.labels(scale)[2]
@@ -86,13 +98,18 @@ class AssemblyDrawing:
     def labels(self, scale: float) -> tuple[list[Label], list[np.ndarray], int]:
         """All labels, their places on paper (mm, from the drawing's origin), and how many of them
         cover another."""
+        if scale in self._found:
+            return self._found[scale]
+        pieces = self.placed.pieces.pieces
+        of_pieces = [label for piece in pieces for label in self._piece_labels(piece, scale)]
         found = [*self._joint_labels(scale), *self._lamella_labels(scale)]
-        for piece in self.placed.pieces.pieces:
-            found += self._piece_labels(piece, scale)
+        # labels of cells belong in their middles, those of rods leave the joints theirs
+        found = of_pieces + found if len(self.cells) else found + of_pieces
         points = [*self.joints, *self.corners.values()]
         dots = [shapely.Point(at / scale).buffer(0.6, quad_segs=2) for at in points]
         rods = [shapely.LineString(line / scale) for line in self.lines]
-        return found, *place(found, dots, rods)
+        self._found[scale] = found, *place(found, dots, rods)
+        return self._found[scale]
 
     def _joint_labels(self, scale: float) -> Iterator[Label]:
         for number, at in enumerate(self.joints / scale, 1):
@@ -123,7 +140,8 @@ class AssemblyDrawing:
             return
         lines = self._of(piece)
         if not has_joint(kind) or len(lines) != len(piece.parameters):
-            middle = np.mean([line.mean(axis=0) for line in lines], axis=0) / scale
+            own = self.cells[[piece.element - 1]] if len(self.cells) else lines
+            middle = np.mean([line.mean(axis=0) for line in own], axis=0) / scale
             around = [
                 middle + r * np.array([np.cos(turn), np.sin(turn)])
                 for r in (2.0, 4.0)
@@ -188,7 +206,9 @@ class AssemblyDrawing:
             for piece in pieces
         ]
         clip = None if window is None else (*window[0], *(window[1] - window[0]))
-        for over in (False, True):
+        if len(self.cells):
+            self._draw_cells(ax, scale, origin, clip, shades)
+        for over in (False, True) if not len(self.cells) else ():
             numbers = [k for k, above in enumerate(upper) if above == over]
             lines = [origin + self.lines[k] / scale for k in numbers]
             colours = [
@@ -208,7 +228,7 @@ class AssemblyDrawing:
         corners = np.array([origin + at / scale for at in self.corners.values()]).reshape(-1, 2)
         inside = np.all((corners > window[0]) & (corners < window[1]), axis=1)
         ax.plot(*corners[inside].T, ls="", marker="D", ms=2.0, color=INK, zorder=4)
-        labels, places, _ = self._chosen
+        labels, places, _ = self.labels(scale)
         for label, at in zip(labels, places):
             x, y = origin + at
             if np.all(([x, y] > window[0] + 1) & ([x, y] < window[1] - 1)):
@@ -228,6 +248,18 @@ class AssemblyDrawing:
                     parse_math=False,
                 )
 
+    def _draw_cells(self, ax: Axes, scale: float, origin: np.ndarray, clip, shades) -> None:
+        """Plates in their parts' colours, made lighter so that labels can be read on them."""
+        colours = [
+            0.45 * shades[piece.kind][piece.part] + 0.55 for piece in self.placed.pieces.pieces
+        ]
+        plates = PolyCollection(
+            list(origin + self.cells / scale), facecolors=colours, edgecolors=INK, linewidths=0.4
+        )
+        ax.add_collection(plates, autolim=False)
+        if clip is not None:
+            plates.set_clip_path(Rectangle(clip[:2], *clip[2:], transform=ax.transData))
+
     def _near_joints(self, chain: int, line: np.ndarray) -> Iterator[np.ndarray]:
         """The bits of a rod piece next to the joints that it ends at."""
         for end, body in zip((0, -1), self.placed.ends[chain]):
@@ -236,14 +268,8 @@ class AssemblyDrawing:
                 step = step / (np.linalg.norm(step) or 1.0) * (1 if end == 0 else -1)
                 yield np.array([line[end], line[end] + _GAP * step])
 
-    @cached_property
-    def _chosen(self) -> tuple[list[Label], list[np.ndarray], int]:
-        return self.labels(self.scale)
-
 
 def _add(ax: Axes, lines: Sequence[np.ndarray], colours, width: float, clip) -> None:
-    from matplotlib.patches import Rectangle
-
     collection = LineCollection(lines, colors=colours, linewidths=width, capstyle="butt")
     ax.add_collection(collection, autolim=False)
     if clip is not None:
@@ -292,15 +318,26 @@ def flattened(
         [flat[chain.nodes] for chain in scene.chains],
         (joints - centre) @ axes,
         {p: (state.positions[c.body] - centre) @ axes for p, c in placed.corners.items()},
+        _plates(placed, centre, axes),
     )
+
+
+def _plates(placed: PlacedPieces, centre: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """(n_cells, 3, 2) plates of a design of cells; none of others."""
+    hardware = placed.design.hardware
+    if hardware is None:
+        return np.zeros((0, 3, 2))
+    corners = np.dstack([hardware.corners, np.full(hardware.corners.shape[:2], centre[2])])
+    return (corners - centre) @ axes
 
 
 def assembly_pages(book: Book, drawing: AssemblyDrawing) -> None:
     """The drawing on pages: all of it first, then, where that is more than one page, its parts."""
-    scale = drawing.scale
-    page = book.page(f"Assembly of {drawing.name}", scale)
+    page = book.page(f"Assembly of {drawing.name}")
     low, room = page.low + [0.0, 6.0], page.room - [0.0, 6.0]
     size = np.ptp(drawing.box, axis=0)
+    # as large as one page allows, and larger where labels need it
+    page.scale = scale = min(drawing.scale, fitting_scale(size, room - 14.0, SCALES[0]))
     if (size / scale <= room - 14.0).all():
         origin = low + room / 2 - drawing.box.mean(axis=0) / scale
         drawing.draw(page.ax, scale, origin, np.array([low, low + room]))
@@ -360,7 +397,7 @@ def draw_assembly(drawing: AssemblyDrawing) -> Figure:
 def explanation(placed: PlacedPieces) -> str:
     """What the labels mean."""
     kinds = {piece.kind for piece in placed.pieces.pieces}
-    if any(placed.joint_of(piece) is not None for piece in placed.pieces.pieces):
+    if any(has_joint(part_kind(kind)) for kind in kinds):
         text = (
             "bold: part, along its side 1 (·2: only its side 2 is used) · grey: element, joint · "
             "(n): lamella · drawn through: the upper lamella"

@@ -6,6 +6,7 @@ from typing import Any
 
 from .assembly import stands_on_edge
 from .blanks import Blanks
+from .cells import CellParts
 from .lamellas import LOWER, UPPER, Lamella, Lamellas
 from .pieces import DesignPieces
 from .placement import PlacedPieces
@@ -56,6 +57,8 @@ def fasteners(blanks: Blanks) -> list[dict[str, Any]]:
 
     As many as the design with most of them needs, and for every design.
     """
+    if blanks.cells is not None:
+        return _pins(blanks.cells)
     board, options = blanks.board, blanks.options
     counts = {design.design.name: _counted(design, blanks) for design in blanks.parts.designs}
     rows = []
@@ -72,6 +75,27 @@ def fasteners(blanks: Blanks) -> list[dict[str, Any]]:
             }
             rows.append(row | {f"in_{name}": number for name, number in numbers.items()})
     return rows
+
+
+def _pins(cells: CellParts) -> list[dict[str, Any]]:
+    """Pins of cells: one a hinge at a plate, one through each crossing, two lock every beam."""
+    t, width = cells.thickness, cells.width
+    apart = 2 * abs(cells.scale * cells.hardware[0].arm_position)
+    rows = (
+        ("hinge pin, plates", cells.pin, width + t, cells.hinges),
+        ("axle, crossings", cells.pin, apart + width, cells.crossings),
+        ("locking pin, crossings", t / 4, width, 4 * cells.crossings),
+    )
+    return [
+        {
+            "item": item,
+            "diameter_mm": diameter,
+            "clamps_mm": round(clamped, 2),
+            "length_mm": round(clamped + 2 * _SPARE * diameter, 1),
+            "pieces": number,
+        }
+        for item, diameter, clamped, number in rows
+    ]
 
 
 def _counted(design: DesignPieces, blanks: Blanks) -> dict[str, int]:

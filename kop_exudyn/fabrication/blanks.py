@@ -21,7 +21,8 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import InputError
-from ..kit.kinds import PartKind, part_kind
+from ..kit.kinds import PartKind, has_joint, part_kind
+from .cells import CellParts
 from .options import CutOptions, millimetres
 from .pieces import PartsList
 from .placement import PlacedPieces, bars_needed, sharpest_crossings
@@ -228,9 +229,18 @@ class Blanks:
         )
 
     @cached_property
+    def cells(self) -> CellParts | None:
+        """Arms and plates, of kits whose designs say what their cells are made of."""
+        if all(pieces.design.hardware is not None for pieces in self.parts.designs):
+            return CellParts(self.parts, self.scale, self.options)
+        return None
+
+    @cached_property
     def bars(self) -> tuple[Bar, ...]:
-        """Plain bars of parts that are sets of bars, as many as the design with most of them
-        needs."""
+        """Plain bars of parts that are sets of bars, as many as the design with most of them needs;
+        none where it is known how such parts are made (see `cells`)."""
+        if self.cells is not None:
+            return ()
         return tuple(
             Bar(f"{label} {name}", int(count), float(self.scale * length))
             for kind, label, _, value, number in self._needed()
@@ -302,6 +312,10 @@ class Blanks:
         return float(width + self.options.clearance)
 
     def _problems(self) -> Iterator[str]:
+        if self.cells is not None:
+            yield from self.cells.problems
+        if not self.strips:
+            return
         corners, d, breadth = self.corners, self.options.bolt_hole, self.board.breadth
         if corners.bolts and self._angles.max() > _SHARPEST:
             yield (
@@ -335,8 +349,3 @@ class Blanks:
                         f"part {label} crosses another at {np.degrees(angle):.0f} degrees: too "
                         "sharp for a slot"
                     )
-
-
-def has_joint(kind: PartKind) -> bool:
-    """Whether a kind's parts are beams with a joint between two sides."""
-    return kind.parameter_names[:2] == ("l1", "l2")

@@ -10,7 +10,7 @@ from .cutlist import cut_list, totals
 from .cutsheets import Sheet
 from .options import Tolerances
 from .paper import Book
-from .part_pages import plate_pages, sheet_pages, stock_pages, strip_pages
+from .part_pages import cell_pages, plate_pages, sheet_pages, stock_pages, strip_pages
 from .stock import StockPlan
 
 # of cut lists, what stands in the note above or on the parts' own pages
@@ -50,6 +50,7 @@ def workshop_book(
     book.table("Material and fasteners", [*material, *fasteners(blanks)])
     strip_pages(book, blanks)
     plate_pages(book, blanks)
+    cell_pages(book, blanks)
     stock_pages(book, blanks, plan)
     sheet_pages(book, sheets)
     for drawing in drawings:

@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 
 from ..files.tables import write_csv
 from ..kit.kinds import PartKind, part_kind
 from .blanks import Blanks, Strip
+from .cells import CellParts
 from .options import Tolerances
 from .pieces import PartsList
 
@@ -27,7 +29,7 @@ def cut_list(blanks: Blanks, tolerances: Tolerances = Tolerances()) -> list[dict
     corner points, as designs and assembly plans have them; what is sawn is `cut_length_mm`, with
     the joint's middle at `hole_from_end_mm` and bolt holes at `bolts_from_end_mm`, all from the
     sawn end of side 1. `setback_mm` is by how much either end is shorter than its axis. Cells have
-    the number of their bars.
+    the number of their arms of each length and sort (see `cells`).
     """
     rows = []
     parts, needed = blanks.parts, blanks.parts.needed()
@@ -52,6 +54,11 @@ def cut_list(blanks: Blanks, tolerances: Tolerances = Tolerances()) -> list[dict
                 for bar in blanks.bars
                 if bar.label.startswith(f"{label} ")
             }
+            row |= {
+                f"arms_{arm.label.removeprefix(label).strip().replace(' ', '_')}": arm.count
+                for arm in (() if blanks.cells is None else blanks.cells.arms)
+                if arm.label.startswith(f"{label} ")
+            }
             if label in strips:
                 row |= _sawn(strips[label])
             if label in plates:
@@ -67,6 +74,8 @@ def cut_list(blanks: Blanks, tolerances: Tolerances = Tolerances()) -> list[dict
 def totals(blanks: Blanks) -> list[dict[str, Any]]:
     """One row a sort of material: section, material, pieces, their length in m, their area in
     m2."""
+    if blanks.cells is not None:
+        return _totals_of_cells(blanks.cells)
     board, strips = blanks.board, blanks.strips
     rows: list[dict[str, Any]] = []
     if strips:
@@ -101,6 +110,27 @@ def totals(blanks: Blanks) -> list[dict[str, Any]]:
                 "material": board.material,
                 "pieces": sum(bar.count for bar in blanks.bars),
                 "length_m": round(length, 3),
+            }
+        )
+    return rows
+
+
+def _totals_of_cells(cells: CellParts) -> list[dict[str, Any]]:
+    """Plates, ears and arms' boards: pieces, and the area of their outlines."""
+    rows = []
+    for item, labels in (("plates", "P"), ("ears", "E"), ("arms' boards", None)):
+        chosen = [
+            t
+            for t in cells.templates()
+            if (t.label == labels if labels else t.label not in ("P", "E"))
+        ]
+        area = sum(t.count * shapely.Polygon(t.shapes[0].points).area for t in chosen)
+        rows.append(
+            {
+                "item": item,
+                "section_mm": f"{chosen[0].thickness:g} thick",
+                "pieces": sum(t.count for t in chosen),
+                "area_m2": round(area / 1e6, 4),
             }
         )
     return rows

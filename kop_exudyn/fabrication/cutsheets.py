@@ -14,8 +14,8 @@ import numpy as np
 from ..errors import InputError
 from .blanks import Blanks
 from .options import NOTE_ROOM, CutOptions
-from .shapes import NOTES, Polyline, Shape, Text, rectangle
-from .templates import Template, templates
+from .shapes import NOTES, Polyline, Shape, Template, Text, rectangle
+from .templates import templates
 
 _NOTE_HEIGHT = 6.0  # mm
 _SCALE_BAR = 100.0  # mm, to check a print with

@@ -13,7 +13,7 @@ from collections import defaultdict, deque
 from dataclasses import dataclass
 from functools import cached_property
 
-from ..kit.kinds import part_kind
+from ..kit.kinds import has_joint, part_kind
 from .pieces import Piece
 from .placement import PlacedPieces
 
@@ -47,7 +47,7 @@ class Lamellas:
         straight = [
             p
             for p in self.placed.pieces.pieces
-            if not part_kind(p.kind).angular and self.placed.joint_of(p) is not None
+            if has_joint(part_kind(p.kind)) and self.placed.joint_of(p) is not None
         ]
         by_number = {piece.element: piece for piece in straight}
         starts = [p.element for p in straight if p.element not in preceded]

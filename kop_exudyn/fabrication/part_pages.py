@@ -11,9 +11,9 @@ from ..drawing.style import FAINT, INK, QUIET
 from .blanks import Blanks, Strip
 from .cutsheets import Sheet
 from .paper import Book, Page, fitting_scale
-from .shapes import CUT, ENGRAVE, NOTES, Hole, Polyline, Shape, Text
+from .shapes import CUT, ENGRAVE, NOTES, Hole, Polyline, Shape, Template, Text
 from .stock import StockPlan
-from .templates import Template, plate_template, strip_template
+from .templates import plate_template, strip_template
 
 _COLOURS = {CUT: INK, ENGRAVE: QUIET, NOTES: FAINT}
 _DIMENSION = 6.0  # points
@@ -87,6 +87,38 @@ def plate_pages(book: Book, blanks: Blanks) -> None:
                 ha="center",
                 va="center",
             )
+
+
+def cell_pages(book: Book, blanks: Blanks) -> None:
+    """Plate, ear and both boards of every arm, at full size where the paper allows."""
+    if blanks.cells is None:
+        return
+    cells, wanted = blanks.cells, blanks.cells.templates()
+    room = Page(book.paper, "").room
+    size = np.max([template.size for template in wanted], axis=0)
+    scale = fitting_scale(size, room - [12.0, 30.0])
+    note = (
+        f"Pins {cells.pin:g} mm, along the plates' edges. Arms are laid up of two boards (1 with "
+        "the disc, 2 without); at a crossing the discs of two arms lie side by side, locked by two "
+        f"pins of {cells.thickness / 4:g} mm."
+    )
+    page, at, below = None, np.zeros(2), 0.0
+    for template in sorted(wanted, key=lambda t: -t.size[1]):
+        width, height = np.maximum(template.size / scale, [26.0, 0.0]) + [6.0, 13.0]
+        if page is None or at[0] + width > page.high[0]:
+            at = np.array([page.low[0] if page else 0.0, below])
+            if page is None or at[1] - height < page.low[1]:
+                page = book.page("Plates, ears and arms", scale)
+                page.text(page.low[0], page.high[1], note, 7.5, va="top", color=QUIET)
+                at = np.array([page.low[0], page.high[1] - 8.0])
+            below = at[1] - height
+        middle = at + [width / 2, -template.size[1] / scale / 2]
+        _template(page, template, middle - np.mean(template.box, axis=0) / scale, scale)
+        text = f"{template.label}: {template.count} pieces"
+        under = at[1] - template.size[1] / scale - 3.0
+        page.text(middle[0], under, text, 7, ha="center", va="center", weight="bold")
+        page.text(middle[0], under - 3.5, template.name.split(",")[0], 6, ha="center", va="center")
+        at = at + [width, 0.0]
 
 
 def sheet_pages(book: Book, sheets: Sequence[Sheet]) -> None:

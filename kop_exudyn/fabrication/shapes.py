@@ -85,3 +85,30 @@ def rectangle(left: float, bottom: float, right: float, top: float, layer: str =
         True,
         layer,
     )
+
+
+@dataclass(frozen=True)
+class Template:
+    """What is cut of one part.
+
+    label, name : the part's label; a line about it
+    count : pieces to cut for the whole kit
+    shapes : in mm, anywhere
+    thickness : of the board, mm
+    """
+
+    label: str
+    name: str
+    count: int
+    shapes: tuple[Shape, ...]
+    thickness: float
+
+    @property
+    def box(self) -> np.ndarray:
+        """(2, 2) lowest and highest x, y."""
+        return box_of(self.shapes)
+
+    @property
+    def size(self) -> np.ndarray:
+        """(2,) width and height."""
+        return np.ptp(self.box, axis=0)

@@ -2,41 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from .blanks import Blanks, CornerPlate, Strip
-from .shapes import ENGRAVE, Hole, Polyline, Shape, Text, box_of, rectangle
+from .shapes import ENGRAVE, Hole, Polyline, Shape, Template, Text, rectangle
 
 _ARC = 12  # chords of half a circle at a slide's end
-
-
-@dataclass(frozen=True)
-class Template:
-    """What is cut of one part.
-
-    label, name : the part's label; a line about it
-    count : pieces to cut for the whole kit
-    shapes : in mm, anywhere
-    thickness : of the board, mm
-    """
-
-    label: str
-    name: str
-    count: int
-    shapes: tuple[Shape, ...]
-    thickness: float
-
-    @property
-    def box(self) -> np.ndarray:
-        """(2, 2) lowest and highest x, y."""
-        return box_of(self.shapes)
-
-    @property
-    def size(self) -> np.ndarray:
-        """(2,) width and height."""
-        return np.ptp(self.box, axis=0)
 
 
 def templates(blanks: Blanks) -> list[Template]:
@@ -45,7 +16,8 @@ def templates(blanks: Blanks) -> list[Template]:
     Raises InputError where the designs' rods have different sections.
     """
     bars = [bar_template(bar.label, bar.length, bar.count, blanks) for bar in blanks.bars]
-    return [*map(plate_template, blanks.plates), *map(strip_template, blanks.strips), *bars]
+    cells = [] if blanks.cells is None else blanks.cells.templates()
+    return [*map(plate_template, blanks.plates), *map(strip_template, blanks.strips), *bars, *cells]
 
 
 def strip_template(strip: Strip) -> Template:

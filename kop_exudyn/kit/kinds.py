@@ -186,3 +186,8 @@ def part_kind(name: str) -> PartKind:
             f"unknown kind of parts (known: {', '.join(kind_names())})", field="parts", value=name
         )
     return kind
+
+
+def has_joint(kind: PartKind) -> bool:
+    """Whether a kind's parts are beams with a joint between two sides."""
+    return kind.parameter_names[:2] == ("l1", "l2")

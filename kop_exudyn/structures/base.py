@@ -20,6 +20,7 @@ from ..errors import InputError
 from ..kit.groups import ElementGroup
 from ..plugins import Registry
 from ..units import Units, units_from_dict
+from .hardware import CellHardware
 from .loads import LoadCase, load_case_from_dict
 
 if TYPE_CHECKING:
@@ -116,6 +117,11 @@ class Design(ABC):
     def report_positions(self, state: State) -> np.ndarray:
         """Joint positions (n, 3) in the order and the units of the design's own file."""
         return state.positions[self.joints]
+
+    @property
+    def hardware(self) -> CellHardware | None:
+        """Arms and plates, of classes whose parts are cells; None of others."""
+        return None
 
     @property
     def fitted_role(self) -> Role:

@@ -150,7 +150,7 @@ def test_a_large_drawing_is_split_into_pages_that_show_everything():
     parts = parts_list(found.kit, found.assignment, [design])
     book = Book("a4", "lattice")
     assembly_pages(book, assembly_drawing(parts, "lattice", "mm"))
-    assert len(book.pages) > 3
+    assert len(book.pages) >= 3
     first, *others = book.pages
     assert {str(n) for n in range(1, len(others) + 1)} <= {t.get_text() for t in first.ax.texts}
     shown = Counter(

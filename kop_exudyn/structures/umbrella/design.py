@@ -16,8 +16,10 @@ from ...rods.sections import Material, material_from_dict
 from ...units import Units
 from ..base import Design, Role, Target, register_class, register_format
 from ..fitting import best_placement
+from ..hardware import CellHardware
 from .bodies import RODS, joint_bodies
 from .deployment import Deployment, Solver, Stage, drawn_towards, follow, state_of
+from .hardware import cell_hardware
 from .layout import BaseMesh, Plates, umbrella_mesh
 from .mesh import UmbrellaMesh, UmbrellaTarget
 from .pins import Pins, pins_from_dict
@@ -272,6 +274,10 @@ class Umbrella(Design):
         """Positions of all joints, plates' included, in the order and the units of the design's own
         file."""
         return self._bodies.positions(state)
+
+    @property
+    def hardware(self) -> CellHardware:
+        return cell_hardware(self.mesh)
 
     def spacings(self, state: State) -> np.ndarray:
         """Distance (n_cells,) of the two plates of every cell."""

@@ -1,0 +1,159 @@
+"""Cells as things that can be made: pins, discs and hinges, put together again on the table."""
+
+import numpy as np
+import pytest
+import shapely
+
+import kop_exudyn as kop
+from kop_exudyn.errors import InputError
+from kop_exudyn.fabrication.assembly_order import fasteners
+from kop_exudyn.fabrication.blanks import Blanks
+from kop_exudyn.fabrication.cutlist import cut_list, totals
+from kop_exudyn.fabrication.cutsheets import cut_sheets
+from kop_exudyn.fabrication.folder import export_workshop
+from kop_exudyn.fabrication.options import CutOptions
+from kop_exudyn.fabrication.pieces import parts_list
+from kop_exudyn.fabrication.shapes import Hole, Polyline
+from kop_exudyn.kit.cluster import cluster
+
+
+@pytest.fixture(scope="module")
+def hill(repository):
+    return kop.load_design(repository / "models" / "umbrellas" / "hill.json")
+
+
+@pytest.fixture(scope="module")
+def parts(hill):
+    found = cluster(hill.groups, hill.parameters, {"cell": 4})
+    return parts_list(found.kit, found.assignment, [hill])
+
+
+def holes(template):
+    return [shape for shape in template.shapes if isinstance(shape, Hole)]
+
+
+def outline(template):
+    return shapely.Polygon(template.shapes[0].points)
+
+
+def of(blanks, label):
+    return next(t for t in blanks.cells.templates() if t.label == label)
+
+
+def test_pins_of_every_arm_are_where_the_mesh_has_its_joints(hill, parts):
+    """Distance of both holes: that of the mesh's joints, their axis left out (pins run along it).
+
+    The mesh is compact, its arms upright; the kit's arms are as long as their parts."""
+    blanks = Blanks(parts, "mm")
+    mesh, rods = hill.mesh, hill.mesh.rods
+    kit = parts.kit["cell"]
+    arms = np.flatnonzero(rods.arms)
+    sorts = {t.label: t for t in blanks.cells.templates()}
+    compared = 0
+    for arm, data in zip(arms, hill.hardware.arms):
+        at_plate, at_crossing = mesh.positions[rods.joints[arm]]
+        axis = np.cross(rods.normals[arm], [0.0, 0.0, 1.0])
+        between = at_crossing - at_plate
+        between = between - (between @ axis) * axis
+        piece = parts.designs[0].by_parameter[data.parameter]
+        column = piece.columns[piece.parameters.index(data.parameter)]
+        name = ("top", "bottom")[column]
+        lengths = mesh.lengths[rods.cells[arm], rods.sides[arm]]
+        label = f"{parts.label(piece)} {name} {'b' if data.opposite else 'a'}1"
+        plate_pin, axle = holes(sorts[label])[:2]
+        step = axle.centre - plate_pin.centre
+        across = abs(between @ rods.normals[arm])
+        assert abs(between[2]) == pytest.approx(lengths)
+        assert abs(step[0]) == pytest.approx(kit[piece.part, column])
+        assert abs(step[1]) == pytest.approx(across, abs=1e-6)
+        compared += 1
+    assert compared == len(arms) == sum(t.count for t in sorts.values() if t.label.endswith("1"))
+
+
+def test_two_arms_make_a_straight_beam_about_one_axle(parts):
+    """An arm and another one turned by half a turn about the axle: their discs and locking pins
+    coincide, their bars lie in one line; boards 1 do not meet boards 1 but in the discs."""
+    blanks = Blanks(parts, "mm")
+    first, second = of(blanks, "C1 top b1"), of(blanks, "C2 bottom b1")
+    axle = holes(first)[1].centre
+    turned = {}
+    for name, template in (("first", first), ("second", second)):
+        middle = holes(template)[1].centre
+        sign = 1 if name == "first" else -1
+        turned[name] = [sign * (hole.centre - middle) for hole in holes(template)]
+    np.testing.assert_allclose(turned["first"][1], turned["second"][1])  # the axle
+    locks = {tuple(np.round(at, 9)) for at in turned["first"][2:]}
+    assert locks == {tuple(np.round(at, 9)) for at in turned["second"][2:]} and len(locks) == 2
+    short = of(blanks, "C1 top b2")
+    assert not outline(short).intersects(
+        shapely.Point(axle).buffer(3.0)
+    )  # room for the other's disc
+    assert short.thickness == first.thickness == 2.5
+
+
+def test_holes_keep_off_the_edges(parts):
+    for template in Blanks(parts, "mm").cells.templates():
+        shape = outline(template)
+        assert shape.is_valid
+        for hole in holes(template):
+            disc = shapely.Point(hole.centre).buffer(hole.diameter / 2)
+            assert shape.contains(disc) and shape.exterior.distance(disc) > 0.2 * hole.diameter
+
+
+def test_plates_take_arm_and_ear_at_every_edge(hill, parts):
+    """The notch clears the arm's lug and the ear; the ear's pin lies on the plate's edge."""
+    blanks = Blanks(parts, "mm")
+    plate, ear = of(blanks, "P"), of(blanks, "E")
+    shape, h = outline(plate), hill.hardware
+    inradius = h.edge / (2 * np.sqrt(3))
+    low = h.arm_position - h.width / 2
+    lug = shapely.box(low, -inradius - 2.25, low + h.width, -inradius + 2.25)
+    beside = shapely.box(low - 0.2 - 3.0, -inradius - 2.25, low - 0.2, -inradius + 2.25)
+    slots = [s for s in plate.shapes[1:] if isinstance(s, Polyline)]
+    assert len(slots) == 3 and plate.count == 72 and ear.count == 180
+    for k in range(3):
+        for thing in (lug, beside):
+            around = shapely.affinity.rotate(thing, 120 * k, origin=(0, 0))
+            assert shape.intersection(around).area < 1e-9
+        assert shape.contains(shapely.Polygon(slots[k].points))
+    tab = np.ptp(shapely.Polygon(slots[0].points).exterior.coords, axis=0)
+    np.testing.assert_allclose(sorted(tab), [3.2, 4.7], atol=1e-9)  # the tab with its clearance
+    assert holes(ear)[0].centre.tolist() == [0.0, 0.0]
+
+
+def test_lists_count_arms_plates_and_pins(hill, parts):
+    blanks = Blanks(parts, "mm")
+    rows = cut_list(blanks)
+    arms = sum(v for row in rows for name, v in row.items() if name.startswith("arms_"))
+    assert arms == len(hill.hardware.arms) == 180
+    assert not blanks.problems and not blanks.bars and not blanks.strips
+    pins = {row["item"]: row["pieces"] for row in fasteners(blanks)}
+    assert list(pins.values()) == [180, 45, 180]
+    assert [row["pieces"] for row in totals(blanks)] == [72, 180, 360]
+    on_sheets = {}
+    for sheet in cut_sheets(blanks):
+        assert sheet.thickness in (3.0, 2.5)
+        for label, count in sheet.labels.items():
+            on_sheets[label] = on_sheets.get(label, 0) + count
+    assert on_sheets == {t.label: t.count for t in blanks.cells.templates()}
+
+
+def test_smaller_holes_are_taken_and_plates_without_room_are_named(parts, repository):
+    small = Blanks(parts, "mm", CutOptions(joint_hole=1.0))
+    assert {hole.diameter for hole in holes(of(small, "E"))} == {1.0}
+    import json
+
+    data = json.loads((repository / "models" / "umbrellas" / "hill.json").read_text())
+    data["plates"] |= {"width": 12.0}
+    wide = kop.design_from_dict(data)
+    found = cluster(wide.groups, wide.parameters, {"cell": 2})
+    blanks = Blanks(parts_list(found.kit, found.assignment, [wide]), "mm")
+    assert "no room at plate edges" in blanks.problems[0]
+    with pytest.raises(InputError, match="no room"):
+        blanks.check()
+
+
+def test_the_folder_of_a_kit_of_cells(parts, tmp_path):
+    files = {path.name for path in export_workshop(parts, tmp_path, "mm", formats=["dxf"])}
+    assert {"workshop.pdf", "cut_list.csv", "fasteners.csv", "joints_hill.csv"} <= files
+    assert "bars.csv" not in files and "steps_hill.csv" not in files
