@@ -2,6 +2,7 @@
 and uses NumPy; what else there is to say to setuptools stands in setup.cfg."""
 
 import importlib.util
+import shutil
 from pathlib import Path
 
 from setuptools import Distribution, setup
@@ -20,6 +21,11 @@ class BuildWithKernels(build_py):
         super().run()
         if self.editable_mode:  # compiled at first use, and again after changes
             return
+        for file in sorted(Path("models").glob("*/*")):  # for `kop examples`
+            if file.suffix in (".json", ".obj"):
+                copy = Path(self.build_lib) / "kop_exudyn" / "examples" / file.parent.name
+                copy.mkdir(parents=True, exist_ok=True)
+                shutil.copy(file, copy)
         try:
             build_kernels.build(Path(self.build_lib) / FOLDER / build_kernels.BUILT.name)
         except build_kernels.BuildError as error:

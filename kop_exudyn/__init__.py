@@ -10,9 +10,42 @@ The names below are loaded at first use, so that ``import kop_exudyn`` costs mil
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:  # the same names, for type checkers and editors
+    from .analysis.simulation import SimulationResult as SimulationResult
+    from .analysis.simulation import simulate as simulate
+    from .equilibrium.sensitivities import Sensitivities as Sensitivities
+    from .errors import InputError as InputError
+    from .errors import SimulationFailure as SimulationFailure
+    from .exchange.export import export_desk as export_desk
+    from .exchange.export import export_simulation as export_simulation
+    from .fabrication.folder import export_workshop as export_workshop
+    from .fabrication.options import CutOptions as CutOptions
+    from .fabrication.pieces import parts_list_of as parts_list_of
+    from .io.datasets import load_designs as load_designs
+    from .io.designs import load_design as load_design
+    from .io.kits import load_kit as load_kit
+    from .io.kits import save_kit as save_kit
+    from .io.results import load_result as load_result
+    from .io.saved_runs import load_run as load_run
+    from .kit.cluster import cluster as cluster
+    from .kit.groups import ElementGroup as ElementGroup
+    from .kit.parts import Assignment as Assignment
+    from .kit.parts import Kit as Kit
+    from .report.kit_report import write_kit_report as write_kit_report
+    from .report.kit_run import optimize_and_report as optimize_and_report
+    from .search.input_fit import fit_input as fit_input
+    from .search.objective import Weights as Weights
+    from .search.result import KitResult as KitResult
+    from .search.run import optimize_kit as optimize_kit
+    from .search.settings import JobSettings as JobSettings
+    from .search.settings import StageSettings as StageSettings
+    from .structures.base import Design as Design
+    from .structures.base import design_from_dict as design_from_dict
+    from .structures.loads import LoadCase as LoadCase
 
 # module -> the public names that it holds
 _PUBLIC = {
@@ -49,12 +82,14 @@ _MODULE_OF = {name: module for module, names in _PUBLIC.items() for name in name
 __all__ = ["__version__", *sorted(_MODULE_OF)]
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _MODULE_OF:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
-    globals()[name] = value  # found directly from now on
-    return value
+if not TYPE_CHECKING:  # checkers would take every name for one of ours
+
+    def __getattr__(name: str) -> Any:
+        if name not in _MODULE_OF:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        value = getattr(import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
+        globals()[name] = value  # found directly from now on
+        return value
 
 
 def __dir__() -> list[str]:
