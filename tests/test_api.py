@@ -31,7 +31,7 @@ def test_type_checkers_see_the_same_names():
     tree = ast.parse(Path(kop_exudyn.__file__).read_text(encoding="utf-8"))
     blocks = [node for node in tree.body if isinstance(node, ast.If)]
     seen: dict[str, set[str]] = {}
-    for node in (node for block in blocks for node in block.body):
+    for node in blocks[0].body:
         assert isinstance(node, ast.ImportFrom) and node.module
         seen.setdefault(node.module, set()).update(alias.name for alias in node.names)
     assert seen == {module: set(names) for module, names in kop_exudyn._PUBLIC.items()}
