@@ -91,8 +91,8 @@ def test_an_import_from_a_later_folder_is_seen(tmp_path):
 
 
 def modules_of(package: Path) -> dict[str, Path]:
-    """Modules by dotted name within the package; a folder stands for its __init__. The package's own
-    face only hands names on, and is left out."""
+    """Modules by dotted name within the package; a folder stands for its __init__. The package's
+    own face only hands names on, and is left out."""
     found = {}
     for file in package.rglob("*.py"):
         parts = file.relative_to(package).with_suffix("").parts

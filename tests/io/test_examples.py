@@ -13,7 +13,7 @@ def test_copies_can_be_read_and_are_not_overwritten(tmp_path, capsys):
     assert str(tmp_path / "models" / "small") in capsys.readouterr().out
     copies = [tmp_path / "models" / f.parent.name / f.name for f in example_files()]
     assert [copy.read_bytes() for copy in copies] == [f.read_bytes() for f in example_files()]
-    assert load_design(tmp_path / "models" / "small" / "01_sinh.json").name == "sinh"
+    assert load_design(tmp_path / "models" / "small" / "01_sinh.json").name == "small sinh"
     copies[0].write_text("mine")
     copies[-1].unlink()
     with pytest.raises(InputError, match="exists"):
