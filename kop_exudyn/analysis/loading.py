@@ -131,6 +131,7 @@ def supports_of(design: Design, unloaded: Equilibrium, case: LoadCase) -> np.nda
         found = pinned
     else:
         down = _DOWN if case.gravity is None or not case.gravity.any() else case.gravity
+        down = down / np.abs(down).max()  # whose square may be too small for its norm
         found = _outermost(x, down / np.linalg.norm(down))
     if not hold_in_place(x[found]):
         raise InputError(

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import math
 
+from ..files.documents import LARGEST, SMALLEST
+
 
 def part_counts(text: str) -> dict[str, int]:
     """``linear=12,angular=5`` as {"linear": 12, "angular": 5}; whether there are such kinds is
@@ -131,13 +133,14 @@ def _assignments(text: str, what: str, form: str) -> dict[str, str]:
 
 
 def _numbers(text: str, counts: tuple[int, ...]) -> list[float]:
-    """Finite numbers between commas; none where their count isn't one of these, or the text is
-    something else."""
+    """Numbers between commas, of a size whose powers double precision can hold; none where their
+    count isn't one of these, or the text is something else."""
     try:
         values = [float(piece) for piece in text.split(",")]
     except ValueError:
         return []
-    return values if len(values) in counts and all(map(math.isfinite, values)) else []
+    sensible = all(v == 0 or SMALLEST <= abs(v) <= LARGEST for v in values)
+    return values if len(values) in counts and sensible else []
 
 
 def _whole(text: str, least: int, what: str) -> int:

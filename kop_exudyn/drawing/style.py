@@ -4,6 +4,7 @@ and pixel files."""
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +12,7 @@ from pathlib import Path
 import matplotlib
 from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from PIL import Image
 
 from ..files.files import write_bytes
@@ -29,6 +31,9 @@ PALETTE = {
 CYCLE = tuple(PALETTE.values())
 # text and main lines; axes and notes; what is compared with
 INK, QUIET, FAINT = "#222222", "#6b6b6b", "#c9c9c9"
+
+# The formulas in our own labels, and those of matplotlib's logarithmic axes.
+_FORMULA = re.compile(r"\$(w_c|10\^\{-?\d+\}|\\mathdefault\{[^$]*\})\$")
 
 _SETTINGS = {
     "font.family": "sans-serif",
@@ -86,9 +91,18 @@ def figure_bytes(figure: Figure, suffix: str) -> bytes:
         suffix
     ]
     buffer = io.BytesIO()
+    show_dollars(figure)
     with style():
         figure.savefig(buffer, format=suffix, metadata=metadata)
     return buffer.getvalue()
+
+
+def show_dollars(figure: Figure) -> None:
+    """Let texts with dollar signs that are not this project's own formulas, as the names of
+    designs may have them, be drawn as they are; matplotlib would read, or fail to read, TeX."""
+    for text in figure.findobj(Text):
+        if "$" in _FORMULA.sub("", text.get_text()):
+            text.set_parse_math(False)
 
 
 def with_palette(png: bytes, colours: int) -> bytes:

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from .. import __version__
 from ..drawing.labels import text_extent
-from ..drawing.style import FAINT, INK, QUIET, style
+from ..drawing.style import FAINT, INK, QUIET, show_dollars, style
 from ..errors import InputError
 from ..files.files import write_bytes
 
@@ -146,7 +146,9 @@ class Book:
         with style(), PdfPages(buffer, metadata={"CreationDate": None, "Title": self.title}) as pdf:
             for number, page in enumerate(self.pages, 1):
                 _frame(page, self.title, number, len(self.pages))
-                pdf.savefig(page.finish())
+                figure = page.finish()
+                show_dollars(figure)
+                pdf.savefig(figure)
         return write_bytes(path, buffer.getvalue(), overwrite=overwrite)
 
 

@@ -13,7 +13,8 @@ from typing import Any
 from ..errors import InputError
 
 _LONGEST = 160  # characters of a message that quotes what it found
-LARGEST = 1e60  # of numbers, whose powers stay within double precision
+# Of numbers, whose powers stay within double precision, and of whole numbers.
+LARGEST, SMALLEST, LARGEST_WHOLE = 1e60, 1e-60, 2**53
 _PREFIX = "urn:kop_exudyn:"
 _TYPES = {
     "object": "an object",
@@ -73,8 +74,11 @@ def check_schema(data: Any, schema: str, source: Any = None) -> None:
 
 
 def check_range(data: Any, source: Any = None) -> None:
-    """Raise InputError for a number beyond 1e60, whose powers would leave the range of double
-    precision."""
+    """Raise InputError for numbers that double precision can't work with: beyond 1e60, or below
+    1e-60 without being zero, whose powers would leave its range, and whole numbers beyond 2^53.
+
+    Coordinates may be as small as they like, since they are only added to others.
+    """
     waiting: list[tuple[list[str | int], Any]] = [([], data)]
     while waiting:
         path, value = waiting.pop()
@@ -82,15 +86,23 @@ def check_range(data: Any, source: Any = None) -> None:
             waiting += [([*path, key], item) for key, item in value.items()]
         elif isinstance(value, list):
             waiting += [([*path, k], item) for k, item in enumerate(value)]
-        elif isinstance(value, (int, float)) and not -LARGEST <= value <= LARGEST:
-            raise InputError(
-                "is out of range", source=source, field=dotted(path), value=_shown(value)
-            )
+        elif isinstance(value, (int, float)):
+            largest = LARGEST if isinstance(value, float) else LARGEST_WHOLE
+            if not -largest <= value <= largest:
+                raise InputError(
+                    "is out of range", source=source, field=dotted(path), value=_shown(value)
+                )
+            if 0 < abs(value) < SMALLEST and isinstance(path[-1], str):
+                raise InputError(
+                    "is too small to be told from 0", source=source, field=dotted(path), value=value
+                )
 
 
 def _shown(value: int | float) -> str | float:
-    """The number, or words for an integer, which has more than sixty digits here."""
-    return value if isinstance(value, float) else f"an integer of {len(str(abs(value)))} digits"
+    """The number, or words for an integer of more than twenty digits."""
+    if isinstance(value, float) or abs(value) < 10**20:
+        return value
+    return f"an integer of {len(str(abs(value)))} digits"
 
 
 def has_schema(schema: str) -> bool:

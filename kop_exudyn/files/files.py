@@ -28,7 +28,7 @@ def read_bytes(path: str | Path, limit: int = SIZE_LIMIT) -> bytes:
 
     Raises InputError when it can't be read, is damaged, or is larger than `limit` bytes.
     """
-    path = Path(path)
+    path = _without_nul(path)
     try:
         with open(path, "rb") as file:
             content = file.read(limit + 1)
@@ -54,7 +54,7 @@ def write_bytes(path: str | Path, content: bytes, *, overwrite: bool = False) ->
 
     Raises InputError when the file exists and `overwrite` is false, or when it can't be written.
     """
-    path = Path(path)
+    path = _without_nul(path)
     check_output_file(path, overwrite=overwrite)
     temporary = None
     try:
@@ -82,13 +82,21 @@ def is_temporary(path: Path) -> bool:
 
 
 def write_text(path: str | Path, text: str, *, overwrite: bool = False) -> Path:
-    """`write_bytes` for text: UTF-8, line ends as they are."""
-    return write_bytes(path, text.encode(), overwrite=overwrite)
+    """`write_bytes` for text: UTF-8, line ends as they are. Raises InputError too for text with
+    surrogates, of file names that aren't UTF-8, say."""
+    try:
+        content = text.encode()
+    except UnicodeEncodeError as error:
+        raise InputError(
+            f"can't be written: a text has {text[error.start]!r}, which is no character",
+            source=path,
+        ) from None
+    return write_bytes(path, content, overwrite=overwrite)
 
 
 def check_output_file(path: str | Path, *, overwrite: bool = False) -> None:
     """Raise InputError unless this file could be written now; its folder must exist."""
-    path = Path(path)
+    path = _without_nul(path)
     if os.path.isdir(path):
         raise InputError("is a folder, expected a file to write", source=path)
     if os.path.exists(path) and not overwrite:
@@ -102,7 +110,7 @@ def make_folder(path: str | Path) -> Path:
 
     Raises InputError when it can't be made or written to.
     """
-    path = Path(path)
+    path = _without_nul(path)
     try:
         path.mkdir(parents=True, exist_ok=True)
         # permission bits tell neither of a full nor of a read-only disk
@@ -113,6 +121,12 @@ def make_folder(path: str | Path) -> Path:
     except OSError as error:
         raise InputError(f"can't be written: {reason_of(error)}", source=path) from None
     return path
+
+
+def _without_nul(path: str | Path) -> Path:
+    if "\0" in str(path):
+        raise InputError("a name can't contain the character NUL", source=repr(str(path)))
+    return Path(path)
 
 
 def _umask() -> int:

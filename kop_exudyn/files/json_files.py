@@ -22,6 +22,8 @@ SIZE_LIMIT = 64 * 2**20
 
 # An innermost list without strings, as json.dumps spreads it over lines.
 _FLAT_LIST = re.compile(r'\[\n\s+([^\[\]{}"]*?)\n\s*\]')
+# How half of a UTF-16 pair is written; two that belong together are one character.
+_HALF = re.compile(r"\\u[dD][89a-fA-F]")
 _LINE_END = re.compile(r"\n\s+")
 
 
@@ -51,6 +53,8 @@ def parse_json(text: str, source: Any = None) -> Any:
         )
         if not _shallower_than(value, MAX_DEPTH):
             raise RecursionError
+        if _HALF.search(text):
+            _refuse_surrogates(value)
     except json.JSONDecodeError as error:
         raise InputError(
             f"not JSON: line {error.lineno}, column {error.colno}: {error.msg}", source=source
@@ -95,6 +99,16 @@ def plain(value: Any) -> Any:
 
 def _refuse_constant(name: str) -> NoReturn:
     raise InputError(f"{name} is not a number that JSON knows")
+
+
+def _refuse_surrogates(value: Any) -> None:
+    try:
+        json.dumps(value, ensure_ascii=False).encode()
+    except UnicodeEncodeError as error:
+        half = ord(error.object[error.start])
+        raise InputError(
+            f"contains \\u{half:04x}, half of a pair of surrogates, which is no character"
+        ) from None
 
 
 def _finite(text: str) -> float:

