@@ -133,6 +133,27 @@ class Sensitivities:
         )
         return out
 
+    def stresses_of(self, elements: np.ndarray) -> np.ndarray:
+        """Derivatives (m, 6, n_parameters) of some elements' generalised stresses."""
+        scene, s = self.system.scene, self.system.sparsity
+        own = s.rows[elements]
+        kept, place = np.unique(own, return_inverse=True)  # absent unknowns are -1
+        values = np.zeros((len(kept), scene.n_parameters))
+        free, driven = (kept >= 0) & (kept < self._n), kept >= self._n
+        values[free] = self.solutions.rows(kept[free])
+        values[driven] = self._driven_map[kept[driven] - self._n].toarray()
+        factor = (
+            self._B[elements]
+            * (scene.stiffness[elements] / self.system.lengths[elements][:, None])[:, :, None]
+        )
+        out = factor @ values[place.reshape(own.shape)]
+        has = np.flatnonzero(scene.length_parameter[elements] >= 0)
+        of = elements[has]
+        out[has, :, scene.length_parameter[of]] += (
+            self._stress_L[of] * scene.length_factor[of][:, None]
+        )
+        return out
+
     def stress_adjoint(self, cotangent: np.ndarray) -> np.ndarray:
         """Gradient (n_parameters,) of J given dJ/d(generalised stresses) (E, 6): one solve, no
         x_q."""

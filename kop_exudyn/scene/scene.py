@@ -164,6 +164,14 @@ class Scene:
             )
         return lengths
 
+    def length_derivative(self, elements: np.ndarray) -> np.ndarray:
+        """Derivatives (m, n_parameters) of some elements' rest lengths."""
+        out = np.zeros((len(elements), self.n_parameters))
+        parameter = self.length_parameter[elements]
+        has = np.flatnonzero(parameter >= 0)
+        out[has, parameter[has]] = self.length_factor[elements[has]]
+        return out
+
     def driven_values(self, q: np.ndarray) -> np.ndarray:
         """Values (m,) of the driven unknowns at q."""
         d = self.driven

@@ -26,6 +26,7 @@ class StepRecord:
     active : bounds and constraints that push
     convexified : whether the model Hessian was indefinite and had to be modified
     solver : the QP solver used
+    excess : the largest by which a nonlinear bound is exceeded after the step
     seconds : wall time by phase, of ``derivatives``, ``qp`` and ``evaluate``
     """
 
@@ -43,6 +44,7 @@ class StepRecord:
     convexified: bool
     solver: str
     seconds: dict[str, float]
+    excess: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,8 @@ class SQPState:
     x : (n,) last accepted point;  radius : trust radius;  step : accepted steps so far
     gradient_scale : projected gradient at the start, which tolerances refer to
     y, z : multipliers of the last QP, its next warm start
+    penalty : that a nonlinear bound's excess is weighted with;  pressure : (k,) multipliers of
+        these bounds
     quasi_newton : arrays of BlockBFGS, empty with exact Hessians
     """
 
@@ -64,15 +68,30 @@ class SQPState:
     gradient_scale: float = 0.0
     y: np.ndarray = field(default_factory=lambda: np.zeros(0))
     z: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    penalty: float = 0.0
+    pressure: np.ndarray = field(default_factory=lambda: np.zeros(0))
     quasi_newton: dict[str, np.ndarray] = field(default_factory=dict)
     history: tuple[StepRecord, ...] = ()
 
     def to_arrays(self) -> dict[str, np.ndarray]:
         """For ``numpy.savez``; no pickling needed."""
         numbers = np.array(
-            [self.radius, self.step, self.evaluations, self.failures, self.gradient_scale]
+            [
+                self.radius,
+                self.step,
+                self.evaluations,
+                self.failures,
+                self.gradient_scale,
+                self.penalty,
+            ]
         )
-        arrays = {"x": self.x, "numbers": numbers, "y": self.y, "z": self.z}
+        arrays = {
+            "x": self.x,
+            "numbers": numbers,
+            "y": self.y,
+            "z": self.z,
+            "pressure": self.pressure,
+        }
         arrays["history"] = np.array(json.dumps([asdict(record) for record in self.history]))
         return arrays | {f"quasi_newton.{name}": value for name, value in self.quasi_newton.items()}
 
@@ -90,7 +109,7 @@ class SQPState:
 
     @classmethod
     def _from_arrays(cls, arrays: dict[str, np.ndarray]) -> SQPState:
-        radius, step, evaluations, failures, gradient_scale = arrays["numbers"]
+        radius, step, evaluations, failures, gradient_scale, penalty = arrays["numbers"]
         quasi_newton = {
             name.removeprefix("quasi_newton."): np.array(arrays[name])
             for name in arrays
@@ -106,6 +125,8 @@ class SQPState:
             float(gradient_scale),
             np.array(arrays["y"]),
             np.array(arrays["z"]),
+            float(penalty),
+            np.array(arrays["pressure"]),
             quasi_newton,
             records,
         )

@@ -4,14 +4,14 @@ trust radius."""
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from .constraints import LinearConstraints
-from .problem import Derivatives, LiftedTerm
+from .problem import Derivatives, Inequalities, LiftedTerm
 from .qp import QP, QPResult, QPSolver
 from .qp_backends import factorise_positive
 
@@ -41,21 +41,40 @@ class QuadraticModel:
 
     H : (n + k, n + k) positive definite;  qp : the subproblem in (u, w);  convexified : H differs
         from the given one
+    bounds : nonlinear bounds linearised in u, or None;  penalty : weight of their excess, see
+        `penalty_of`
     """
 
     region: Region
     qp: QP
     convexified: bool
+    bounds: Inequalities | None = None
+    penalty: float = 0.0
 
     def predicted(self, solution: np.ndarray) -> float:
         """The reduction that the model promises for a solution (n + k,) of the subproblem."""
-        return -float(self.qp.g @ solution + 0.5 * solution @ (self.qp.H @ solution))
+        reduction = -float(self.qp.g @ solution + 0.5 * solution @ (self.qp.H @ solution))
+        if self.bounds is None:
+            return reduction
+        u = solution[: self.region.n]
+        return reduction + self.penalty * (
+            penalty_of(self.excess(np.zeros_like(u))) - penalty_of(self.excess(u))
+        )
+
+    def excess(self, u: np.ndarray) -> np.ndarray:
+        """(k,) by how much the linearised bounds are exceeded after a step u (n,)."""
+        assert self.bounds is not None
+        out = np.zeros(self.bounds.bound.max(initial=-1) + 1)
+        np.maximum.at(out, self.bounds.bound, self.bounds.value + self.bounds.jacobian @ u)
+        return out
 
 
 @dataclass(frozen=True)
 class ModelStep:
-    """A step of the model: u (n,) in scaled variables, its damping, prediction and the QP's
-    result."""
+    """A step of the model: u (n,) in scaled variables, its damping, prediction and the QP's result.
+
+    pressure : (k,) multipliers of the nonlinear bounds, empty where none is met with
+    """
 
     u: np.ndarray
     length: float
@@ -63,10 +82,25 @@ class ModelStep:
     predicted: float
     result: QPResult
     wall_s: float
+    pressure: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+
+def penalty_of(excess: np.ndarray) -> float:
+    """What an excess (k,) of the nonlinear bounds counts, before its weight: sum e + e^2 / 2.
+
+    The linear part makes the penalty exact (Fletcher 1987, section 14.3: a weight above the
+    multipliers makes solutions meet the bounds); the quadratic one keeps the elastic subproblem
+    strictly convex in its slacks.
+    """
+    return float(np.sum(excess + 0.5 * excess**2))
 
 
 def build_model(
-    x: np.ndarray, derivatives: Derivatives, hessian: sp.csc_matrix, region: Region
+    x: np.ndarray,
+    derivatives: Derivatives,
+    hessian: sp.csc_matrix,
+    region: Region,
+    penalty: float = 0.0,
 ) -> QuadraticModel:
     """The model at x. An indefinite Hessian is made positive definite block by block, a definite
     one left alone."""
@@ -80,7 +114,16 @@ def build_model(
     if convexified:
         whole = lift(convexify(scaled), extra, region.scale)
     gradient = np.concatenate([region.scale * derivatives.gradient, np.zeros(k)])
-    return QuadraticModel(region, _subproblem(x, whole, gradient, region), convexified)
+    bounds = derivatives.inequalities
+    if bounds is not None:
+        bounds = (
+            replace(bounds, jacobian=sp.csr_matrix(bounds.jacobian @ scale))
+            if bounds.rows
+            else None
+        )
+    return QuadraticModel(
+        region, _subproblem(x, whole, gradient, region), convexified, bounds, penalty
+    )
 
 
 def _subproblem(x: np.ndarray, H: sp.csc_matrix, g: np.ndarray, region: Region) -> QP:
@@ -173,6 +216,8 @@ def minimise_model(
     if first is not None and first.length <= _RADIUS_HIGH * radius:
         return replace(first, wall_s=time.perf_counter() - began)
     most = float(np.linalg.norm(model.qp.g[: model.region.n])) / radius
+    if model.bounds is not None:
+        most += _steepest_penalty(model) / radius
     least, damping = 0.0, 0.1 * most
     previous = None if first is None else (0.0, 1 / first.length)
     best = None
@@ -203,6 +248,48 @@ def _next_damping(previous, known, radius: float, least: float, most: float) -> 
     return float(guess) if low <= guess <= high else float(np.sqrt(max(least, 1e-3 * most) * most))
 
 
+def _steepest_penalty(model: QuadraticModel) -> float:
+    """A bound on the slope of the penalty."""
+    assert model.bounds is not None
+    rows = np.sqrt(
+        np.asarray(model.bounds.jacobian.multiply(model.bounds.jacobian).sum(axis=1)).ravel()
+    )
+    steepest = np.zeros(model.bounds.bound.max(initial=-1) + 1)
+    np.maximum.at(steepest, model.bounds.bound, rows)
+    return model.penalty * float(steepest @ (1 + model.excess(np.zeros(model.region.n))))
+
+
+def _elastic(model: QuadraticModel, qp: QP) -> tuple[QP, np.ndarray]:
+    """The subproblem with slacks t >= 0 of the bounds behind its unknowns, and the bounds (b,) that
+    have one.
+
+    They come at the price penalty (t + t^2 / 2), so that a step exists wherever it starts from.
+    """
+    rows = model.bounds
+    assert rows is not None
+    bounds, slack = np.unique(rows.bound, return_inverse=True)
+    m, b, size = rows.rows, len(bounds), qp.g.size
+    weight = np.full(b, model.penalty)
+    slacks = sp.csr_matrix((-np.ones(m), (np.arange(m), slack)), shape=(m, b))
+    A = sp.bmat(
+        [
+            [qp.A, sp.csr_matrix((qp.lo.size, b))],
+            [sp.hstack([rows.jacobian, sp.csr_matrix((m, size - model.region.n))]), slacks],
+        ],
+        format="csr",
+    )
+    return QP(
+        sp.csc_matrix(sp.block_diag([qp.H, sp.diags(weight)])),
+        np.append(qp.g, weight),
+        A,
+        np.append(qp.lo, np.full(m, -np.inf)),
+        np.append(qp.hi, -rows.value),
+        np.append(qp.lb, np.zeros(b)),
+        np.append(qp.ub, np.full(b, np.inf)),
+        qp.border + b,
+    ), bounds
+
+
 def _damped(model: QuadraticModel, damping: float, solver: QPSolver, start) -> ModelStep | None:
     n, qp = model.region.n, model.qp
     if damping > 0:
@@ -213,10 +300,47 @@ def _damped(model: QuadraticModel, damping: float, solver: QPSolver, start) -> M
     result = solver.solve(qp, (np.zeros(qp.g.size), y, np.append(z, np.zeros(qp.g.size - n))))
     if result.status != "solved":
         return None
+    pressure = np.zeros(0)
+    if model.bounds is not None and model.excess(result.x[:n]).max(initial=0.0) > 0:
+        result, pressure = _solved_elastic(model, qp, solver, (result.x, y, z), result.wall_s)
+        if result is None:
+            return None
     u = result.x[:n]
     return ModelStep(
-        u, float(np.linalg.norm(u)), damping, model.predicted(result.x), result, result.wall_s
+        u,
+        float(np.linalg.norm(u)),
+        damping,
+        model.predicted(result.x[: qp.g.size]),
+        result,
+        result.wall_s,
+        pressure,
     )
+
+
+def _solved_elastic(
+    model: QuadraticModel, qp: QP, solver: QPSolver, start, wall_s: float
+) -> tuple[QPResult | None, np.ndarray]:
+    """The elastic subproblem's solution without its slacks, and the bounds' multipliers (k,)."""
+    rows = model.bounds
+    assert rows is not None
+    elastic, bounds = _elastic(model, qp)
+    x, y, z = start
+    t = model.excess(x[: model.region.n])[bounds]
+    m, free = rows.rows, elastic.g.size - z.size
+    result = solver.solve(
+        elastic, (np.append(x, t), np.append(y, np.zeros(m)), np.append(z, np.zeros(free)))
+    )
+    if result.status != "solved":
+        return None, np.zeros(0)
+    pressure = np.zeros(rows.bound.max() + 1)
+    np.add.at(pressure, rows.bound, result.y[qp.lo.size :])
+    return replace(
+        result,
+        x=result.x[: qp.g.size],
+        y=result.y[: qp.lo.size],
+        z=result.z[: qp.g.size],
+        wall_s=result.wall_s + wall_s,
+    ), pressure
 
 
 def projected_gradient(

@@ -3,7 +3,7 @@ constraints."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,11 +16,16 @@ from .constraints import LinearConstraints
 @dataclass(frozen=True)
 class Point:
     """An evaluated point: x (n,), the objective there, and whatever the problem keeps with it
-    (equilibria)."""
+    (equilibria).
+
+    excess : (k,) by how much each of the problem's nonlinear bounds is exceeded, not negative; see
+        `Inequalities`
+    """
 
     x: np.ndarray
     value: float
     data: Any = None
+    excess: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -39,6 +44,27 @@ class LiftedTerm:
 
 
 @dataclass(frozen=True)
+class Inequalities:
+    """Nonlinear bounds, linearised at a point: value + jacobian dx <= 0 in every row.
+
+    A bound says that the largest of several functions stays below zero (stresses in the elements of
+    one state, say). Its rows are those of these functions that may become the largest; a bound that
+    is far from being met with has none.
+
+    value : (m,);  jacobian : (m, n);  bound : (m,) int, the bound that each row belongs to, a place
+        in `Point.excess`
+    """
+
+    value: np.ndarray
+    jacobian: sp.csr_matrix
+    bound: np.ndarray
+
+    @property
+    def rows(self) -> int:
+        return len(self.value)
+
+
+@dataclass(frozen=True)
 class Derivatives:
     """Derivatives at a point.
 
@@ -47,6 +73,7 @@ class Derivatives:
     extra : see LiftedTerm; comes on top of ``hessian``
     own_gradient : (n,) gradient of the part that ``hessian`` belongs to, without the lifted term's
         (default: all)
+    inequalities : linearised nonlinear bounds, where the problem has any
     point : the point that they were taken at, where the problem improved on the one it was given
         (states confirmed or refined); it takes that one's place
     """
@@ -55,11 +82,17 @@ class Derivatives:
     hessian: sp.csc_matrix | None = None
     extra: LiftedTerm | None = None
     own_gradient: np.ndarray | None = None
+    inequalities: Inequalities | None = None
     point: Point | None = None
 
 
 class Problem(Protocol):
     """min f(x) with lower <= x <= upper and linear constraints.
+
+    Nonlinear bounds are kept by an exact penalty: points carry their excess, derivatives the
+    linearised bounds. What is only worth computing for points that would be accepted (and may still
+    refuse them, by SimulationFailure) goes into ``completed(point, previous)``, which a problem may
+    have.
 
     A problem may also have ``scale`` (n,), the typical change of each variable (default 1), in
     which steps and gradients are measured, and ``block_sizes``, the sizes of the consecutive groups

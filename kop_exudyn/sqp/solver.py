@@ -22,6 +22,7 @@ from .model import (
     build_model,
     minimise_model,
     nearest_feasible,
+    penalty_of,
     projected_gradient,
 )
 from .problem import Derivatives, Point, Problem, block_sizes_of, scale_of
@@ -52,6 +53,9 @@ class SQPOptions:
     accept : least share of the predicted reduction that a step must attain
     feasibility : violation of the constraints by the start, in the constraints' units, that is put
         right silently
+    penalty : weight of a nonlinear bound's excess in the merit function, at first; where a minimum
+        of that still exceeds a bound by more than `excess`, it is raised tenfold, `raises` times at
+        most
     qp : settings of the QP solver
     """
 
@@ -66,6 +70,9 @@ class SQPOptions:
     min_radius: float = 1e-10
     accept: float = 1e-4
     feasibility: float = 1e-9
+    penalty: float = 1.0
+    excess: float = 1e-3
+    raises: int = 1
     qp: QPOptions = QPOptions()
 
     def __post_init__(self) -> None:
@@ -80,6 +87,8 @@ class SQPOptions:
             "radius",
             "min_radius",
             "accept",
+            "penalty",
+            "excess",
         ):
             if not getattr(self, name) > 0:
                 raise InputError("must be positive", field=name, value=getattr(self, name))
@@ -155,6 +164,7 @@ class _Run:
         self._derivatives = problem.derivatives
         if options.hessian == "bfgs":
             self._derivatives = getattr(problem, "first_derivatives", problem.derivatives)
+        self._completed = getattr(problem, "completed", None)
         self.bfgs = BlockBFGS(sizes, self.region.scale) if options.hessian == "bfgs" else None
         corrected = options.secant and options.hessian == "exact"
         self.secant = SecantCorrection(sizes, self.region.scale) if corrected else None
@@ -166,7 +176,8 @@ class _Run:
         point = derivatives.point or point
         while True:
             norm, state = self._stationarity(point, derivatives, state)
-            if norm <= self.options.gradient_tolerance * max(
+            met = not point.excess.any()
+            if met and norm <= self.options.gradient_tolerance * max(
                 state.gradient_scale, abs(point.value)
             ):
                 return self._result(
@@ -184,7 +195,7 @@ class _Run:
                     "state"
                 )
                 return self._result(state, point, False, text)
-            model = self._model(point, derivatives)
+            model = self._model(point, derivatives, state.penalty)
             outcome = self._step(point, model, state, norm)
             if isinstance(outcome, SQPResult):
                 return outcome
@@ -205,7 +216,11 @@ class _Run:
         if state is None:
             n, m = self.region.n, self.region.constraints.rows
             state = SQPState(
-                self._feasible_start(x0), self.options.radius, y=np.zeros(m), z=np.zeros(n)
+                self._feasible_start(x0),
+                self.options.radius,
+                y=np.zeros(m),
+                z=np.zeros(n),
+                penalty=self.options.penalty,
             )
         elif state.quasi_newton and (learnt := self.bfgs or self.secant):
             learnt.restore(state.quasi_newton)
@@ -242,11 +257,11 @@ class _Run:
         norm = projected_gradient(point.x, gradient, self.region, self.projection)
         return norm, replace(state, gradient_scale=norm) if state.step == 0 else state
 
-    def _model(self, point: Point, derivatives: Derivatives) -> QuadraticModel:
+    def _model(self, point: Point, derivatives: Derivatives, penalty: float) -> QuadraticModel:
         if self.bfgs is not None:
             self.bfgs.observe(point.x, derivatives.gradient)
             return build_model(
-                point.x, replace(derivatives, extra=None), self.bfgs.matrix(), self.region
+                point.x, replace(derivatives, extra=None), self.bfgs.matrix(), self.region, penalty
             )
         if derivatives.hessian is None:
             raise InputError(
@@ -261,7 +276,7 @@ class _Run:
             )
             self.secant.observe(point.x, own, hessian)
             hessian = hessian + self.secant.matrix()
-        return build_model(point.x, derivatives, hessian, self.region)
+        return build_model(point.x, derivatives, hessian, self.region, penalty)
 
     def _step(self, point: Point, model: QuadraticModel, state: SQPState, norm: float):
         """The next accepted state and point, or the result when there is none."""
@@ -285,8 +300,12 @@ class _Run:
             x = np.clip(point.x + self.region.scale * step.u, self.region.lower, self.region.upper)
             try:
                 trial = self._timed("evaluate", self.problem.evaluate, x, point)
-                actual = point.value - trial.value
+                actual = self._merit(point, state) - self._merit(trial, state)
                 accepted = actual >= self.options.accept * step.predicted  # false for NaN
+                if accepted and self._completed is not None:
+                    trial = self._timed("evaluate", self._completed, trial, point)
+                    actual = self._merit(point, state) - self._merit(trial, state)
+                    accepted = actual >= self.options.accept * step.predicted
                 # a point without derivatives can't be gone on from: it counts as failed
                 derivatives = (
                     self._timed("derivatives", self._derivatives, trial) if accepted else None
@@ -334,6 +353,7 @@ class _Run:
             model.convexified,
             step.result.solver,
             self.seconds,
+            float(trial.excess.max(initial=0.0)),
         )
         self.seconds = {}
         return replace(
@@ -343,6 +363,7 @@ class _Run:
             step=state.step + 1,
             y=step.result.y,
             z=step.result.z[: self.region.n],
+            pressure=step.pressure,
             history=(*state.history, record),
             quasi_newton=learnt.to_arrays() if (learnt := self.bfgs or self.secant) else {},
         )
@@ -368,6 +389,11 @@ class _Run:
                 "at its numerical accuracy or its derivatives are wrong"
             )
         return self._result(state, point, False, text)
+
+    @staticmethod
+    def _merit(point: Point, state: SQPState) -> float:
+        """The exact penalty function that steps have to lower."""
+        return point.value + state.penalty * penalty_of(point.excess)
 
     @staticmethod
     def _count(state: SQPState, trials: int, failures: int) -> SQPState:
