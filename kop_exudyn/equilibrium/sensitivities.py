@@ -135,7 +135,7 @@ class Sensitivities:
 
     def stresses_of(self, elements: np.ndarray) -> np.ndarray:
         """Derivatives (m, 6, n_parameters) of some elements' generalised stresses."""
-        scene, s = self.system.scene, self.system.sparsity
+        scene, s = self._system.scene, self._system.sparsity
         own = s.rows[elements]
         kept, place = np.unique(own, return_inverse=True)  # absent unknowns are -1
         values = np.zeros((len(kept), scene.n_parameters))
@@ -144,7 +144,7 @@ class Sensitivities:
         values[driven] = self._driven_map[kept[driven] - self._n].toarray()
         factor = (
             self._B[elements]
-            * (scene.stiffness[elements] / self.system.lengths[elements][:, None])[:, :, None]
+            * (scene.stiffness[elements] / self._lengths[elements][:, None])[:, :, None]
         )
         out = factor @ values[place.reshape(own.shape)]
         has = np.flatnonzero(scene.length_parameter[elements] >= 0)

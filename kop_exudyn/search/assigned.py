@@ -54,6 +54,7 @@ def assigned_stage(
     numbers : of the rounds, where this isn't the first call: every SQP has a name of its own
     """
     settings = stages.settings
+    start = stages.kept(start)
     if settings.reassignments == 0:
         name = "assigned" if numbers is None else f"assigned-{next(numbers)}"
         return stages.assigned(start, name) if stages.rule.parts_move else start
@@ -64,8 +65,8 @@ def assigned_stage(
         for trial in _bold_trials(stages, best)[:leaps]:
             leaps -= 1
             landed = rounds.alternated(rounds.landed(trial), _AFTER_LEAP)
-            log.info("a leap ends at J = %.5g, from %.5g", _value(landed), best.value)
-            if _value(landed) < best.value:
+            log.info("a leap ends at J = %.5g, from %.5g", _value(landed), _value(best))
+            if _value(landed) < _value(best):
                 leaps = leaps if rounds.worthwhile(best, landed) else 0
                 best = landed
                 break
@@ -190,9 +191,9 @@ def _best_trial(stages: Stages, best: StageResult) -> StageResult | None:
     if stages.rule.parts_move:
         trials += _together(stages, best, derivatives)
     found = [trial for trial in trials if trial is not None]
-    if not found or _value(trial := min(found, key=_value)) >= _PATIENCE * best.value:
+    if not found or _value(trial := min(found, key=_value)) >= _PATIENCE * _value(best):
         return None
-    trial = stages.confirmed(trial)
+    trial = stages.kept(trial)
     return trial if trial.value is not None else None
 
 
@@ -202,7 +203,9 @@ def _each_its_own(
     """With the parts as they are the designs don't depend on each other: each takes the best of its
     trials, if any."""
     results = [best, *(trial for trial, _, _ in _several(stages, best, derivatives, keep_parts))]
-    chosen = [min(results, key=lambda result: _share(result, n)) for n in range(len(best.designs))]
+    chosen = [
+        min(results, key=lambda result: _share(stages, result, n)) for n in range(len(best.designs))
+    ]
     return (
         None
         if all(result is best for result in chosen)
@@ -257,7 +260,7 @@ def _bold_trials(stages: Stages, best: StageResult) -> list[StageResult]:
             found.append(trial[0])
         if len(found) == _TRIALS:
             break
-    confirmed = [stages.confirmed(trial) for trial in sorted(found, key=_value)]
+    confirmed = [stages.kept(trial) for trial in sorted(found, key=_value)]
     return [trial for trial in confirmed if trial.value is not None]
 
 
@@ -289,18 +292,22 @@ def _trial(
         damping,
         ", same parts" if move_parts is keep_parts else "",
         _value(trial),
-        best.value + found.predicted.sum(),
+        _value(best) + found.predicted.sum(),
     )
     return trial, found, damping
 
 
 def _value(result: StageResult) -> float:
-    return np.inf if result.value is None else result.value
+    return result.merit
 
 
-def _share(result: StageResult, design: int) -> float:
+def _share(stages: Stages, result: StageResult, design: int) -> float:
+    """A design's share of what results are compared by."""
     outcome = result.designs[design]
-    return outcome.value if isinstance(outcome, Evaluation) else np.inf
+    if not isinstance(outcome, Evaluation):
+        return np.inf
+    weight = stages.dataset.design_weights[design]
+    return weight * outcome.value + stages.dataset.penalty_of(outcome)
 
 
 def _misled(
@@ -308,10 +315,9 @@ def _misled(
 ) -> list[int]:
     """The designs that the model was wrong about: those that ended far above what it promised."""
     allowed = _MISLED * abs(found.predicted.sum())
-    weights = stages.dataset.design_weights
     return [
         n
         for n, (old, new) in enumerate(zip(best.evaluations, trial.designs))
         if isinstance(new, SimulationFailure)
-        or weights[n] * (new.value - old.value) > found.predicted[n] + allowed
+        or _share(stages, trial, n) - _share(stages, best, n) > found.predicted[n] + allowed
     ]

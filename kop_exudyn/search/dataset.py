@@ -14,9 +14,11 @@ from ..errors import InputError, SimulationFailure
 from ..kit.groups import ElementGroup
 from ..kit.kinds import Bounds, part_kind
 from ..scene.state import State
+from ..sqp.model import penalty_of
 from ..structures.base import Design
 from .objective import DesignDerivatives, DesignObjective, Evaluation, Reference, Weights
 from .pool import DesignPool
+from .requirements import Requirements
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -44,6 +46,7 @@ class Dataset:
     weights : of the objective
     numbers : which of the pool's designs
     design_weights : how much each of these counts
+    requirements : that designs have to meet
     tally : counts what was solved
     """
 
@@ -51,6 +54,7 @@ class Dataset:
     weights: Weights
     numbers: tuple[int, ...]
     design_weights: tuple[float, ...]
+    requirements: Requirements = Requirements.none()
     tally: Tally = field(default_factory=Tally)
 
     @classmethod
@@ -211,8 +215,42 @@ class Dataset:
                 self.tally.add(evaluation)
         return found
 
+    def requiring(self, requirements: Requirements) -> Dataset:
+        """The same designs with other requirements."""
+        return replace(self, requirements=requirements)
+
+    def open(
+        self, evaluations: Mapping[int, Evaluation]
+    ) -> dict[int, Evaluation | SimulationFailure]:
+        """Some designs opened from their assembly at the evaluations' parameters, see
+        `DesignObjective.opened`."""
+        found = self._map(DesignObjective.opened, {n: (e,) for n, e in evaluations.items()})
+        for evaluation in found.values():
+            if isinstance(evaluation, Evaluation):
+                self.tally.add(evaluation)
+        return found
+
+    def completed(
+        self, evaluations: Sequence[Evaluation], previous: Sequence[Evaluation]
+    ) -> list[Evaluation]:
+        """The evaluations with the states on the way from the assembly, see
+        `DesignObjective.completed`. Raises the first SimulationFailure."""
+        calls = {
+            n: (now, before)
+            for n, (now, before) in enumerate(zip(evaluations, previous))
+            if before.way and not now.way
+        }
+        results: list[Evaluation | SimulationFailure] = list(evaluations)
+        for n, result in self._map(DesignObjective.completed, calls).items():
+            results[n] = result
+            if isinstance(result, Evaluation):
+                self.tally.equilibria += len(result.way)
+                self.tally.newton_iterations += sum(state.iterations for state in result.way)
+        return all_or_raise(results)
+
     def judge(
-        self, calls: Mapping[int, tuple[np.ndarray, Mapping[str, Equilibrium]]]
+        self,
+        calls: Mapping[int, tuple[np.ndarray, Mapping[str, Equilibrium], tuple[Equilibrium, ...]]],
     ) -> dict[int, Evaluation | SimulationFailure]:
         """Evaluations of given parameters and equilibria, (q, {role: equilibrium}) a design."""
         return self._map(DesignObjective.judge, calls)
@@ -223,13 +261,29 @@ class Dataset:
         calls: Mapping[int, tuple[Any, ...]],
     ) -> dict[int, T | SimulationFailure]:
         numbered = self.pool.map(
-            method, self.weights, {self.numbers[n]: call for n, call in calls.items()}
+            method,
+            self.weights,
+            {self.numbers[n]: call for n, call in calls.items()},
+            self.requirements,
         )
         return dict(zip(calls, numbered.values()))
 
     def value(self, evaluations: Sequence[Evaluation]) -> float:
         """Weighted sum of the designs' F."""
         return float(sum(w * e.value for w, e in zip(self.design_weights, evaluations)))
+
+    @property
+    def penalty(self) -> float:
+        """Weight of a bound's excess, against that of J."""
+        return self.requirements.penalty * (self.weights.fit or self.weights.energy)
+
+    def merit(self, evaluations: Sequence[Evaluation]) -> float:
+        """J with what the excess of bounds costs."""
+        return self.value(evaluations) + sum(self.penalty_of(e) for e in evaluations)
+
+    def penalty_of(self, evaluation: Evaluation) -> float:
+        """What the excess of a design's bounds costs."""
+        return self.penalty * penalty_of(np.array(list(evaluation.excess.values())))
 
 
 def all_or_raise(results: Sequence[T | SimulationFailure]) -> list[T]:
@@ -248,7 +302,8 @@ def evaluations_to_arrays(evaluations: Sequence[Evaluation]) -> dict[str, np.nda
     arrays: dict[str, np.ndarray] = {}
     for n, evaluation in enumerate(evaluations):
         arrays[f"{n}/q"] = evaluation.q
-        for role, eq in evaluation.equilibria.items():
+        way = {f"way{k}": state for k, state in enumerate(evaluation.way)}
+        for role, eq in {**evaluation.equilibria, **way}.items():
             for name, value in {**eq.state.to_arrays(), "stress": eq.stress}.items():
                 arrays[f"{n}/{role}/{name}"] = value
             opening = np.nan if eq.opening is None else eq.opening
@@ -262,13 +317,15 @@ def evaluations_from_arrays(dataset: Dataset, arrays: Mapping[str, np.ndarray]) 
     calls = {}
     for n, design in enumerate(dataset.designs):
         equilibria = {}
-        for role in design.roles:
-            prefix = f"{n}/{role.name}/"
+        roles = [role.name for role in design.roles]
+        stations = sum(key.startswith(f"{n}/way") and key.endswith("/numbers") for key in arrays)
+        for role in (*roles, *(f"way{k}" for k in range(stations))):
+            prefix = f"{n}/{role}/"
             opening, *numbers = arrays[prefix + "numbers"].tolist()
             state = State(
                 *(np.array(arrays[prefix + key]) for key in ("positions", "rotations", "angles"))
             )
-            equilibria[role.name] = Equilibrium(
+            equilibria[role] = Equilibrium(
                 state=state,
                 q=np.array(arrays[f"{n}/q"]),
                 opening=None if np.isnan(opening) else opening,
@@ -278,5 +335,6 @@ def evaluations_from_arrays(dataset: Dataset, arrays: Mapping[str, np.ndarray]) 
                 wall_s=0.0,
                 **dict(zip(_EQUILIBRIUM_NUMBERS, numbers)),
             )
-        calls[n] = (np.array(arrays[f"{n}/q"]), equilibria)
+        way = tuple(equilibria.pop(f"way{k}") for k in range(stations))
+        calls[n] = (np.array(arrays[f"{n}/q"]), equilibria, way)
     return all_or_raise(list(dataset.judge(calls).values()))

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 import numpy as np
@@ -23,6 +23,9 @@ from ..equilibrium.sensitivities import Sensitivities
 from ..errors import InputError, SimulationFailure
 from ..structures.base import Design
 from ..structures.fitting import FitResult, TargetFitting
+from ..structures.opening import SAME_STATE
+from ..structures.stress_bound import NEAR, Rows, StressBound
+from .requirements import Requirements
 from .terms.base import Reference, term_class
 
 # A trial point that takes longer than this is better met by a shorter step.
@@ -96,6 +99,10 @@ class Evaluation:
     equilibria : by role
     confirmations : Exudyn's, by role; empty until the point is kept
     iterations, solves : Newton iterations and equilibria that it took
+    utilisation : by state, the largest equivalent stress over what is allowed; empty where stress
+        is not bounded. States are the roles, and the stations of the way that are known
+    way : the states at the stations of `Design.way`, known for points that are kept where designs
+        have to open by themselves
     """
 
     q: np.ndarray
@@ -106,6 +113,13 @@ class Evaluation:
     confirmations: Mapping[str, Confirmation]
     iterations: int
     solves: int
+    utilisation: Mapping[str, float] = field(default_factory=dict)
+    way: tuple[Equilibrium, ...] = ()
+
+    @property
+    def excess(self) -> dict[str, float]:
+        """By how much the bounds are exceeded, by state; zero where they are met."""
+        return {state: max(0.0, value - 1.0) for state, value in self.utilisation.items()}
 
 
 @dataclass(frozen=True)
@@ -114,12 +128,14 @@ class DesignDerivatives:
     evaluation.
 
     seconds : by phase, for profiles
+    bounds : by state, the bounds that come near to being met with, linearised
     """
 
     gradient: np.ndarray
     hessian: np.ndarray | None
     evaluation: Evaluation
     seconds: Mapping[str, float]
+    bounds: Mapping[str, Rows] = field(default_factory=dict)
 
     @property
     def model(self) -> np.ndarray:
@@ -133,9 +149,13 @@ class DesignObjective:
     first use: by each thread that works with it for itself."""
 
     def __init__(
-        self, design: Design, weights: Weights = Weights(), reference: Reference | None = None
+        self,
+        design: Design,
+        weights: Weights = Weights(),
+        reference: Reference | None = None,
+        requirements: Requirements = Requirements.none(),
     ):
-        self.design, self.weights = design, weights
+        self.design, self.weights, self.requirements = design, weights, requirements
         self.reference = reference if reference is not None else reference_of(design)
         self._fitting = TargetFitting(self.reference.target, weights.share)
         self._terms = [
@@ -144,6 +164,14 @@ class DesignObjective:
             if weight
         ]
         self._own = threading.local()
+        self._bounds: dict[str, StressBound] = {}
+        if requirements.stress:
+            bounds = {
+                role.name: StressBound(design, design.scene(role.name), requirements.safety)
+                for role in design.roles
+            }
+            self._bounds = {name: bound for name, bound in bounds.items() if bound.known}
+        self._way = design.way if requirements.opening else None
 
     def evaluate(
         self, q: np.ndarray, previous: Evaluation | None = None, options: NewtonOptions = _TRIAL
@@ -171,6 +199,71 @@ class DesignObjective:
         except SimulationFailure as failure:
             raise failure.within(self.design.name) from None
 
+    def opened(self, evaluation: Evaluation) -> Evaluation:
+        """F of the state that the design opens into by itself at the evaluation's parameters, with
+        the states on its way there.
+
+        Designs that are assembled in place are solved from there. Raises SimulationFailure.
+        """
+        design, q = self.design, evaluation.q
+        role = design.fitted_role.name
+        try:
+            if self._way is None:
+                found = self.judge(q, design.deploy(q))
+                same = self._apart(found, evaluation) <= SAME_STATE
+                return evaluation if same else found
+            *way, deployed = self._way.opened(
+                design.systems, q, design.assembled(q, evaluation.equilibria)
+            )
+        except SimulationFailure as failure:
+            raise failure.within(f"{design.name}: on its way from the assembly") from None
+        if self._way.apart(deployed, evaluation.equilibria[role]) <= SAME_STATE:
+            return self._with_way(evaluation, way)
+        found = self.judge(q, {**evaluation.equilibria, role: deployed})
+        return self._with_way(found, way)
+
+    def completed(self, evaluation: Evaluation, previous: Evaluation) -> Evaluation:
+        """The evaluation with the states on its way from the assembly, from those of a previous
+        one; the same one where these aren't known.
+
+        Raises SimulationFailure where the way from the assembly doesn't lead to it.
+        """
+        if self._way is None or not previous.way or evaluation.way:
+            return evaluation
+        deployed = evaluation.equilibria[self.design.fitted_role.name]
+        try:
+            way = self._way.followed(self.design.systems, evaluation.q, previous.way, deployed)
+        except SimulationFailure as failure:
+            raise failure.within(f"{self.design.name}: on its way from the assembly") from None
+        return self._with_way(evaluation, way)
+
+    def _with_way(self, evaluation: Evaluation, way: Sequence[Equilibrium]) -> Evaluation:
+        """The evaluation with the states on its way, and the stresses there."""
+        assert self._way is not None
+        utilisation = {}
+        bound = self._bounds.get(self.design.fitted_role.name)
+        if bound is not None:
+            utilisation = {
+                station.name: bound.utilisation(state)
+                for station, state in zip(self._way.stations, way)
+            }
+        return replace(
+            evaluation,
+            way=tuple(way),
+            utilisation={**evaluation.utilisation, **utilisation},
+            iterations=evaluation.iterations + sum(state.iterations for state in way),
+            solves=evaluation.solves + len(way),
+        )
+
+    def _apart(self, a: Evaluation, b: Evaluation) -> float:
+        """The largest distance of a joint in two states, as a share of the size."""
+        role = self.design.fitted_role.name
+        x, y = (
+            e.fit.placement.apply(e.equilibria[role].state.positions[self.design.joints])
+            for e in (a, b)
+        )
+        return float(np.linalg.norm(x - y, axis=1).max()) / a.fit.diagonal
+
     def derivatives(self, evaluation: Evaluation, hessian: bool = True) -> DesignDerivatives:
         """Confirm the evaluation's states with Exudyn, then differentiate F at Exudyn's states."""
         begin = perf_counter()
@@ -179,13 +272,17 @@ class DesignObjective:
         begin = perf_counter()
         gradient = np.zeros(len(evaluation.q))
         model = np.zeros((len(evaluation.q),) * 2) if hessian else None
+        bounds = {}
         for role in self.design.roles:
             terms = [(term, weight) for term, weight in self._terms if term.sees(role)]
-            if not terms:
+            near = evaluation.utilisation.get(role.name, 0.0) > NEAR
+            if not terms and not near:
                 continue
             sensitivities = Sensitivities(
                 self.design.systems[role.name], evaluation.equilibria[role.name]
             )
+            if near:
+                bounds[role.name] = self._bounds[role.name].rows(sensitivities)
             for term, weight in terms:
                 if model is None:
                     gradient += weight * term.gradient(role, sensitivities, evaluation.fit)
@@ -193,8 +290,21 @@ class DesignObjective:
                     slope, curvature = term.model(role, sensitivities, evaluation.fit)
                     gradient += weight * slope
                     model += weight * curvature
+        bounds |= self._bounds_on_the_way(evaluation)
         seconds = {"exudyn": exudyn_s, "sensitivities": perf_counter() - begin}
-        return DesignDerivatives(gradient, model, evaluation, seconds)
+        return DesignDerivatives(gradient, model, evaluation, seconds, bounds)
+
+    def _bounds_on_the_way(self, evaluation: Evaluation) -> dict[str, Rows]:
+        """The bounds at the stations that come near to being met with."""
+        if self._way is None or not evaluation.way:
+            return {}
+        bound = self._bounds.get(self.design.fitted_role.name)
+        found = {}
+        for station, state in zip(self._way.stations, evaluation.way):
+            if bound is not None and evaluation.utilisation[station.name] > NEAR:
+                system = self.design.systems[station.scene]
+                found[station.name] = bound.rows(Sensitivities(system, state))
+        return found
 
     def confirm(self, evaluation: Evaluation) -> Evaluation:
         """The same evaluation at Exudyn's own solutions; SimulationFailure where Exudyn doesn't
@@ -245,9 +355,14 @@ class DesignObjective:
             # start there
             return solve(system, q, near, opening, options)
 
-    def judge(self, q: np.ndarray, equilibria: dict[str, Equilibrium]) -> Evaluation:
-        """F of given equilibria; depends on nothing else, so a resumed run judges as the first one
-        did."""
+    def judge(
+        self,
+        q: np.ndarray,
+        equilibria: dict[str, Equilibrium],
+        way: Sequence[Equilibrium] = (),
+    ) -> Evaluation:
+        """F of given equilibria, and of those on the way where they are known; depends on nothing
+        else, so a resumed run judges as the first one did."""
         role = self.design.fitted_role.name
         joints = equilibria[role].state.positions[self.design.joints]
         fit = self._fitting(joints)
@@ -260,7 +375,7 @@ class DesignObjective:
         value = float(sum(terms.values()))
         if not np.isfinite(value):
             raise SimulationFailure("the objective is not a finite number", where=self.design.name)
-        return Evaluation(
+        found = Evaluation(
             np.array(q),
             value,
             terms,
@@ -269,7 +384,9 @@ class DesignObjective:
             {},
             sum(eq.iterations for eq in equilibria.values()),
             len(equilibria),
+            {name: bound.utilisation(equilibria[name]) for name, bound in self._bounds.items()},
         )
+        return self._with_way(found, way) if way else found
 
 
 def reference_of(design: Design) -> Reference:

@@ -16,6 +16,7 @@ from ..plugins import adopt, registered_elsewhere
 from ..structures.base import Design
 from .memory import peak_memory_mb
 from .objective import DesignObjective, Reference, Weights, reference_of
+from .requirements import Requirements
 
 log = logging.getLogger(__name__)
 
@@ -24,7 +25,7 @@ T = TypeVar("T")
 
 # Filled in every worker by its initializer: the designs, and the objectives made of them so far.
 _designs: list[Design] = []
-_objectives: dict[tuple[int, Weights], DesignObjective] = {}
+_objectives: dict[tuple[int, Weights, Requirements], DesignObjective] = {}
 
 
 def _initialise(designs: list[Design]) -> None:
@@ -57,6 +58,7 @@ class _Task(Generic[T]):
     number: int
     reference: Reference | None = None
     weights: Weights = Weights()
+    requirements: Requirements = Requirements.none()
     method: Callable[..., T] | None = None
     arguments: tuple[Any, ...] = ()
 
@@ -67,10 +69,12 @@ def _run_task(task: _Task[T]) -> T | Reference | SimulationFailure:
     try:
         if task.reference is None or task.method is None:
             return reference_of(_designs[task.number])
-        key = (task.number, task.weights)
+        key = (task.number, task.weights, task.requirements)
         if key not in _objectives:
             design = _designs[task.number]
-            _objectives[key] = DesignObjective(design, task.weights, task.reference)
+            _objectives[key] = DesignObjective(
+                design, task.weights, task.reference, task.requirements
+            )
         return task.method(_objectives[key], *task.arguments)
     except SimulationFailure as failure:
         return failure
@@ -125,6 +129,7 @@ class DesignPool:
         method: Callable[Concatenate[DesignObjective, P], T],
         weights: Weights,
         calls: Mapping[int, tuple[Any, ...]],
+        requirements: Requirements = Requirements.none(),
     ) -> dict[int, T | SimulationFailure]:
         """A method of the objectives of some designs, as `DesignObjective.evaluate`.
 
@@ -133,7 +138,7 @@ class DesignPool:
         Returns {number: result or failure}.
         """
         tasks = [
-            _Task(n, self.references[n], weights, method, arguments)
+            _Task(n, self.references[n], weights, requirements, method, arguments)
             for n, arguments in calls.items()
         ]
         return dict(zip(calls, self._run(tasks)))

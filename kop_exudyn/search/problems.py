@@ -4,7 +4,7 @@ alone (assigned)."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,7 +14,7 @@ from ..kit.parts import Assignment, Kit
 from ..kit.projection import Projection
 from ..kit.stock import Stock
 from ..sqp.constraints import LinearConstraints
-from ..sqp.problem import Derivatives, Point
+from ..sqp.problem import Derivatives, Inequalities, Point
 from .dataset import Dataset
 from .kit_rule import KitRule, SoughtKit
 from .objective import DesignDerivatives, Evaluation
@@ -29,6 +29,8 @@ class DatasetPoint:
         same states
     kit, assignment : nearest to the point (relaxed), or that the point is made of (assigned)
     terms : the objective's terms by name, summed over designs
+    bounds : design and state of every bound that came near to being met with, once derivatives are
+        taken there
     """
 
     evaluations: list[Evaluation]
@@ -36,10 +38,13 @@ class DatasetPoint:
     assignment: Assignment
     terms: dict[str, float]
     solved: list[Evaluation]
+    bounds: list[tuple[str, str]] = field(default_factory=list)
 
-    def confirmed(self, designs: Sequence[DesignDerivatives]) -> DatasetPoint:
-        """The same with the evaluations at which derivatives were taken."""
-        return replace(self, evaluations=[d.evaluation for d in designs])
+    def confirmed(
+        self, designs: Sequence[DesignDerivatives], bounds: list[tuple[str, str]]
+    ) -> DatasetPoint:
+        """The same with the evaluations at which derivatives were taken, and the bounds there."""
+        return replace(self, evaluations=[d.evaluation for d in designs], bounds=bounds)
 
 
 class RelaxedProblem:
@@ -78,14 +83,20 @@ class RelaxedProblem:
         nearest = self.rule.nearest(self.projection, x, kit)
         terms = _sum_terms(self.dataset, evaluations) | {"projection": nearest.energy}
         value = self.dataset.value(evaluations) + nearest.energy
-        return Point(
-            x, value, DatasetPoint(evaluations, nearest.kit, nearest.assignment, terms, evaluations)
-        )
+        data = DatasetPoint(evaluations, nearest.kit, nearest.assignment, terms, evaluations)
+        return Point(x, value, data, _excess(evaluations))
+
+    def completed(self, point: Point, previous: Point) -> Point:
+        """The point with the states on its designs' ways from the assembly, where those of the
+        previous one are known. Raises SimulationFailure where a way breaks."""
+        evaluations = self.dataset.completed(point.data.evaluations, previous.data.evaluations)
+        return self.point(point.x, evaluations, point.data.kit)
 
     def derivatives(self, point: Point) -> Derivatives:
         data: DatasetPoint = point.data
         designs = self.dataset.derivatives(data.evaluations, hessian=True)
-        confirmed = replace(point, data=data.confirmed(designs))
+        names, bounds = _bounds(self.dataset, designs)
+        confirmed = replace(point, data=data.confirmed(designs, names))
         weights = self.dataset.design_weights
         own = np.concatenate([w * d.gradient for w, d in zip(weights, designs)])
         gradient = own + self.projection.gradient(point.x, data.kit, data.assignment)
@@ -94,17 +105,18 @@ class RelaxedProblem:
         added, extra = self.rule.model(quadratic)
         if extra is None:
             whole = hessian if added is None else sp.csc_matrix(hessian + added)
-            return Derivatives(gradient, whole, point=confirmed)
-        return Derivatives(gradient, hessian, extra, own, confirmed)
+            return Derivatives(gradient, whole, inequalities=bounds, point=confirmed)
+        return Derivatives(gradient, hessian, extra, own, bounds, confirmed)
 
     def first_derivatives(self, point: Point) -> Derivatives:
         """The gradient alone: one adjoint solve a state instead of all sensitivities."""
         data: DatasetPoint = point.data
         designs = self.dataset.derivatives(data.evaluations, hessian=False)
-        confirmed = replace(point, data=data.confirmed(designs))
+        names, bounds = _bounds(self.dataset, designs)
+        confirmed = replace(point, data=data.confirmed(designs, names))
         own = np.concatenate([w * d.gradient for w, d in zip(self.dataset.design_weights, designs)])
         gradient = own + self.projection.gradient(point.x, data.kit, data.assignment)
-        return Derivatives(gradient, point=confirmed)
+        return Derivatives(gradient, inequalities=bounds, point=confirmed)
 
 
 class AssignedProblem:
@@ -175,12 +187,18 @@ class AssignedProblem:
         """The point of given evaluations."""
         terms = _sum_terms(self.dataset, evaluations)
         data = DatasetPoint(evaluations, self.kit_of(x), self.assignment, terms, evaluations)
-        return Point(x, self.dataset.value(evaluations), data)
+        return Point(x, self.dataset.value(evaluations), data, _excess(evaluations))
+
+    def completed(self, point: Point, previous: Point) -> Point:
+        """As in `RelaxedProblem`."""
+        evaluations = self.dataset.completed(point.data.evaluations, previous.data.evaluations)
+        return self.point(point.x, evaluations)
 
     def derivatives(self, point: Point) -> Derivatives:
         data: DatasetPoint = point.data
         designs = self.dataset.derivatives(data.evaluations, hessian=True)
-        confirmed = replace(point, data=data.confirmed(designs))
+        names, bounds = _bounds(self.dataset, designs, self.matrix)
+        confirmed = replace(point, data=data.confirmed(designs, names))
         gradient, hessian = np.zeros(self.n), np.zeros((self.n, self.n))
         for weight, d, start, end in zip(
             self.dataset.design_weights, designs, self.dataset.offsets, self.dataset.offsets[1:]
@@ -191,17 +209,18 @@ class AssignedProblem:
         unused = np.flatnonzero(np.abs(hessian).sum(axis=1) == 0)
         # parts that nothing uses stay where they are
         hessian[unused, unused] = np.abs(hessian.diagonal()).mean()
-        return Derivatives(gradient, sp.csc_matrix(hessian), point=confirmed)
+        return Derivatives(gradient, sp.csc_matrix(hessian), inequalities=bounds, point=confirmed)
 
     def first_derivatives(self, point: Point) -> Derivatives:
         """The gradient alone, as in `RelaxedProblem`."""
         data: DatasetPoint = point.data
         designs = self.dataset.derivatives(data.evaluations, hessian=False)
-        confirmed = replace(point, data=data.confirmed(designs))
+        names, bounds = _bounds(self.dataset, designs, self.matrix)
+        confirmed = replace(point, data=data.confirmed(designs, names))
         weighted = np.concatenate(
             [w * d.gradient for w, d in zip(self.dataset.design_weights, designs)]
         )
-        return Derivatives(self.matrix.T @ weighted, point=confirmed)
+        return Derivatives(self.matrix.T @ weighted, inequalities=bounds, point=confirmed)
 
     def _limit_by_designs(self) -> None:
         """An element's own bounds are its part's: entries of M are +-1, one a row."""
@@ -218,6 +237,35 @@ class AssignedProblem:
         rows = self.matrix.tocoo()
         np.maximum.at(scale, rows.col, self.dataset.scales()[rows.row])
         return np.where(scale > 0, scale, 1.0)
+
+
+def _excess(evaluations: Sequence[Evaluation]) -> np.ndarray:
+    """By how much the bounds of all designs' states are exceeded."""
+    return np.array([excess for e in evaluations for excess in e.excess.values()])
+
+
+def _bounds(
+    dataset: Dataset, designs: Sequence[DesignDerivatives], matrix: sp.csr_matrix | None = None
+) -> tuple[list[tuple[str, str]], Inequalities | None]:
+    """Design and state of every bound with rows, and all rows in the variables.
+
+    matrix : (n_q, n) derivative of the designs' parameters in the variables, default: the same
+    """
+    n_q = int(dataset.offsets[-1])
+    names, values, rows, number = [], [], [], []
+    for n, (design, found) in enumerate(zip(dataset.designs, designs)):
+        for state, bound in found.bounds.items():
+            wide = sp.csr_matrix(bound.jacobian)
+            wide.indices += int(dataset.offsets[n])
+            wide = sp.csr_matrix((wide.data, wide.indices, wide.indptr), (len(bound.value), n_q))
+            rows.append(wide if matrix is None else wide @ matrix)
+            values.append(bound.value)
+            number += [len(names)] * len(bound.value)
+            names.append((design.name, state))
+    if not names:
+        return names, None
+    jacobian = sp.csr_matrix(sp.vstack(rows))
+    return names, Inequalities(np.concatenate(values), jacobian, np.array(number))
 
 
 def _sum_terms(dataset: Dataset, evaluations: list[Evaluation]) -> dict[str, float]:

@@ -77,7 +77,9 @@ def optimize_kit(
         pool.prepare()
         weights = settings.weights or Weights.suiting(designs)
         dataset = Dataset.of_pool(pool, weights, settings.design_weights)
-        stages = Stages(dataset, sought, settings.stages, store, observe)
+        baselines = Stages(dataset, sought, settings.stages, store, observe)
+        required = dataset.requiring(settings.stages.requirements)
+        stages = Stages(required, sought, settings.stages, store, observe)
         result = KitResult(list(designs), pool.references, events=events)
         found = result.stages
         if start is not None:
@@ -85,10 +87,10 @@ def optimize_kit(
             found["built"] = stages.from_neighbour(np.concatenate(list(start)))
         else:
             announce("direct projection")
-            found["direct"] = stages.direct()
+            found["direct"] = baselines.direct()
             if settings.baselines and kit is None:
                 announce("unrelaxed baseline")
-                found["unrelaxed"] = stages.assigned(found["direct"], "unrelaxed")
+                found["unrelaxed"] = baselines.assigned(found["direct"], "unrelaxed")
             announce("relaxed stage")
             relaxed = stages.relaxed(found["direct"].kit)
             announce("path to the parts")

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from ..kit.kinds import Bounds
 from ..sqp.constraints import LinearConstraints
 from .objective import Weights
+from .requirements import Requirements
 
 
 @dataclass(frozen=True)
@@ -27,9 +28,8 @@ class StageSettings:
     leaps : how often, after these rounds, many elements get other parts at once whatever J does,
         and two more rounds from there; what is no better is undone, and a gain below
         `reassigned_tolerance` is the last, see `assigned_stage`
-    redeployments : how often, after the assigned stage, the designs are opened from their assembly
-        instead of led from the relaxed ones, and the stage goes on from where they end, see
-        `opened_stage` in assigned.py
+    redeployments : how often, after the assigned stage, the stage goes on from where the designs
+        open into, where that is another state, see `opened_stage` in assigned.py
     path_steps : steps of the watched path between the stages
     rescues : how often w_c is raised by ten when a design fails on that path, or snaps and there
         are no reassignments
@@ -39,6 +39,7 @@ class StageSettings:
     constraints : on the elements of all designs, see `on_elements`; the baselines "direct" and
         "unrelaxed" keep to them as far as their parts can
     hessian : "exact" or "bfgs"
+    requirements : that the kit's designs have to meet, see there; not those of the baselines
     """
 
     schedule: tuple[float, ...] | None = None
@@ -53,7 +54,7 @@ class StageSettings:
     reassignments: int = 4
     reassigned_tolerance: float = 2e-2
     leaps: int = 3
-    redeployments: int = 0
+    redeployments: int = 2
     path_steps: int = 10
     rescues: int = 2
     growth: int = 0
@@ -62,6 +63,7 @@ class StageSettings:
     bounds: Bounds | None = None
     constraints: LinearConstraints | None = None
     hessian: str = "exact"
+    requirements: Requirements = Requirements()
 
 
 @dataclass(frozen=True)

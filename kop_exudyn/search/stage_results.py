@@ -13,6 +13,7 @@ from ..errors import SimulationFailure
 from ..kit.parts import Assignment, Kit
 from ..sqp.history import StepRecord
 from ..structures.base import Design
+from ..structures.opening import SAME_STATE  # noqa: F401
 from .dataset import Dataset
 from .objective import Evaluation
 
@@ -20,7 +21,6 @@ from .objective import Evaluation
 # snapped.
 _JUMP_FACTOR = 6.0
 _JUMP_SHARE = 0.01  # of the bounding box; smaller moves are no snap whatever their ratio
-SAME_STATE = 1e-3  # of the bounding box: states whose joints are this close are one
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,9 @@ class StageResult:
 
     kit, assignment : those that the stage ended with
     steps : accepted steps; value : objective (None where a design failed); status : of the last SQP
+    penalty : what the excess of the bounds costs, zero where all are met
+    pressure : by design and state, the multiplier of its bound where that pushes: by how much J
+        would fall for each unit that the bound were wider
     """
 
     designs: list[Evaluation | SimulationFailure]
@@ -74,6 +77,14 @@ class StageResult:
     value: float | None = None
     status: str = ""
     jumps: list[Jump] = field(default_factory=list)
+    penalty: float = 0.0
+    pressure: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    @property
+    def merit(self) -> float:
+        """What results are compared by: the objective with what the excess of bounds costs;
+        infinite where a design failed."""
+        return float("inf") if self.value is None else self.value + self.penalty
 
     @property
     def evaluations(self) -> list[Evaluation]:

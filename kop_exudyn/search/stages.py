@@ -146,16 +146,16 @@ class Stages:
             secant=True,
             max_steps=max_steps or self.settings.assigned_steps,
             decrease_tolerance=tolerance or self.settings.assigned_tolerance,
+            penalty=self.dataset.penalty,
         )
         result = self._sqp(name, problem, point, options, None)
         designs = list(start.designs)
         for n, evaluation in zip(members, result.point.data.evaluations):
             designs[n] = evaluation
-        return self.confirmed(
-            self._result(
-                designs, result.point.data.kit, start.assignment, result.steps, result.status
-            )
+        found = self._result(
+            designs, result.point.data.kit, start.assignment, result.steps, result.status
         )
+        return self.confirmed(replace(found, pressure=_pressure(result)))
 
     def assigned_problem(self, start: StageResult, members: Sequence[int]) -> AssignedProblem:
         """The problem over the parts, for some of the designs."""
@@ -192,8 +192,28 @@ class Stages:
         return self._result(designs, kit, assignment, jumps=jumps)
 
     def judged(self, result: StageResult) -> StageResult:
-        """The same result with the objective of its designs."""
-        return replace(result, value=self._value(result.designs))
+        """The same result with the objective of its designs, and the cost of exceeded bounds."""
+        value, penalty = self._value(result.designs)
+        return replace(result, value=value, penalty=penalty)
+
+    def opened(self, result: StageResult) -> StageResult:
+        """The same result with every design in the state that it opens into by itself, where
+        designs have to; not confirmed yet.
+
+        A design for which no such state is found keeps the one it is in.
+        """
+        if not self.dataset.requirements.opening:
+            return result
+        found = {
+            n: d for n, d in enumerate(result.designs) if isinstance(d, Evaluation) and not d.way
+        }
+        designs = list(result.designs)
+        for n, evaluation in self.dataset.open(found).items():
+            if isinstance(evaluation, SimulationFailure):
+                log.info("%s", evaluation)
+            else:
+                designs[n] = evaluation
+        return self.judged(replace(result, designs=designs))
 
     def confirmed(self, result: StageResult) -> StageResult:
         """The same result at Exudyn's own solutions; a design that Exudyn doesn't confirm becomes a
@@ -203,6 +223,10 @@ class Stages:
         for n, evaluation in self.dataset.confirm(found).items():
             designs[n] = evaluation
         return self.judged(replace(result, designs=designs))
+
+    def kept(self, result: StageResult) -> StageResult:
+        """A result that the search goes on from: opened, and confirmed."""
+        return self.confirmed(self.opened(result))
 
     def redeployed(self, result: StageResult) -> list[Evaluation | SimulationFailure]:
         """Every design built of the result's parts and deployed from its own starting geometry."""
@@ -317,6 +341,7 @@ class Stages:
             decrease_tolerance=settings.last_tolerance
             if weight >= self.schedule[-1]
             else settings.relaxed_tolerance,
+            penalty=self.dataset.penalty,
         )
         return self._sqp(
             name, problem, problem.point(q, list(evaluations), kit), options, weight
@@ -417,14 +442,29 @@ class Stages:
         status: str = "",
         jumps: Sequence[Jump] = (),
     ) -> StageResult:
+        value, penalty = self._value(designs)
         return StageResult(
-            designs, kit, assignment, steps, self._value(designs), status, list(jumps)
+            designs, kit, assignment, steps, value, status, list(jumps), penalty=penalty
         )
 
-    def _value(self, designs: Sequence[Evaluation | SimulationFailure]) -> float | None:
-        """The objective, where no design failed."""
+    def _value(
+        self, designs: Sequence[Evaluation | SimulationFailure]
+    ) -> tuple[float | None, float]:
+        """The objective, where no design failed, and the cost of exceeded bounds."""
         found = [design for design in designs if isinstance(design, Evaluation)]
-        return self.dataset.value(found) if len(found) == len(designs) else None
+        if len(found) < len(designs):
+            return None, 0.0
+        value = self.dataset.value(found)
+        return value, self.dataset.merit(found) - value
+
+
+def _pressure(result: SQPResult) -> dict[str, dict[str, float]]:
+    """Multipliers of the bounds by design and state, those that push."""
+    found: dict[str, dict[str, float]] = {}
+    for (design, state), value in zip(result.point.data.bounds, result.pressure):
+        if value > 0:
+            found.setdefault(design, {})[state] = float(value)
+    return found
 
 
 def _restored(problem: Any, saved: Mapping[str, np.ndarray]) -> tuple[SQPState, Point, list[str]]:

@@ -27,6 +27,7 @@ class StepRecord:
     convexified : whether the model Hessian was indefinite and had to be modified
     solver : the QP solver used
     excess : the largest by which a nonlinear bound is exceeded after the step
+    penalty : weight of the bounds' excess in the reductions
     seconds : wall time by phase, of ``derivatives``, ``qp`` and ``evaluate``
     """
 
@@ -45,6 +46,7 @@ class StepRecord:
     solver: str
     seconds: dict[str, float]
     excess: float = 0.0
+    penalty: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -102,6 +102,8 @@ class SQPResult:
         what to do
     steps, evaluations, failures : accepted steps, evaluated points, and those of them that could
         not be simulated
+    pressure : (k,) multipliers of the nonlinear bounds that have rows at the last point, in the
+        order of `Inequalities.bound`; what widening a bound by one would gain
     """
 
     x: np.ndarray
@@ -113,6 +115,7 @@ class SQPResult:
     failures: int
     history: tuple[StepRecord, ...]
     state: SQPState
+    pressure: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 def minimise(
@@ -175,38 +178,64 @@ class _Run:
         derivatives = self._timed("derivatives", self._derivatives, point)
         point = derivatives.point or point
         while True:
-            norm, state = self._stationarity(point, derivatives, state)
-            met = not point.excess.any()
-            if met and norm <= self.options.gradient_tolerance * max(
-                state.gradient_scale, abs(point.value)
-            ):
-                return self._result(
-                    state, point, True, "converged: the projected gradient met its tolerance"
-                )
-            if self._stalled(state, point):
-                text = (
-                    f"converged: the last {self.options.stall_steps} steps gained less "
-                    "than the tolerance"
-                )
-                return self._result(state, point, True, text)
-            if state.step >= self.options.max_steps:
-                text = (
-                    f"stopped after {state.step} steps: raise max_steps or resume from the last "
-                    "state"
-                )
-                return self._result(state, point, False, text)
-            model = self._model(point, derivatives, state.penalty)
-            outcome = self._step(point, model, state, norm)
+            outcome = self._advanced(state, point, derivatives)
             if isinstance(outcome, SQPResult):
-                return outcome
+                if self._worth_raising(outcome):
+                    state = replace(outcome.state, penalty=10 * outcome.state.penalty)
+                    continue
+                return replace(outcome, pressure=self._pressure(outcome, derivatives))
             state, point, derivatives = outcome
             if self.observer is not None:
                 self.observer(state.history[-1])
             if self.checkpoint is not None:
                 self.checkpoint(state, point)
 
+    def _advanced(self, state: SQPState, point: Point, derivatives: Derivatives):
+        """The next state, point and derivatives; or the result, where there is none."""
+        norm, state = self._stationarity(point, derivatives, state)
+        met = not point.excess.any()
+        if met and norm <= self.options.gradient_tolerance * max(
+            state.gradient_scale, abs(point.value)
+        ):
+            return self._result(
+                state, point, True, "converged: the projected gradient met its tolerance"
+            )
+        if self._stalled(state, point):
+            text = (
+                f"converged: the last {self.options.stall_steps} steps gained less "
+                "than the tolerance"
+            )
+            return self._result(state, point, True, text)
+        if state.step >= self.options.max_steps:
+            text = (
+                f"stopped after {state.step} steps: raise max_steps or resume from the last state"
+            )
+            return self._result(state, point, False, text)
+        model = self._model(point, derivatives, state.penalty)
+        return self._step(point, model, state, norm)
+
+    def _worth_raising(self, result: SQPResult) -> bool:
+        """Whether a minimum of the merit function exceeds a bound that more weight might meet."""
+        most = self.options.penalty * 10**self.options.raises
+        exceeded = result.point.excess.max(initial=0.0) > self.options.excess
+        return bool(result.converged and exceeded and result.state.penalty < 0.99 * most)
+
+    def _pressure(self, result: SQPResult, derivatives: Derivatives) -> np.ndarray:
+        """Multipliers of the nonlinear bounds at the last point, from its own subproblem."""
+        bounds = derivatives.inequalities
+        if bounds is None or not bounds.rows:
+            return np.zeros(0)
+        found = np.zeros(bounds.bound.max() + 1)
+        state = result.state
+        model = self._model(result.point, derivatives, state.penalty)
+        step = minimise_model(model, state.radius, self.qp, (state.y, state.z))
+        if step is not None and len(step.pressure):
+            found = step.pressure
+        return found
+
     def _stalled(self, state: SQPState, point: Point) -> bool:
-        recent = state.history[-self.options.stall_steps :]
+        recent = [r for r in state.history if r.penalty == state.penalty]
+        recent = recent[-self.options.stall_steps :]
         return len(recent) == self.options.stall_steps and sum(
             r.actual for r in recent
         ) <= self.options.decrease_tolerance * abs(point.value)
@@ -354,6 +383,7 @@ class _Run:
             step.result.solver,
             self.seconds,
             float(trial.excess.max(initial=0.0)),
+            state.penalty,
         )
         self.seconds = {}
         return replace(

@@ -24,10 +24,11 @@ from .hardware import CellHardware
 from .loads import LoadCase, load_case_from_dict
 
 if TYPE_CHECKING:
-    from ..equilibrium.equilibria import Equilibrium
+    from ..equilibrium.equilibria import Equilibrium, Start
     from ..equilibrium.system import System
     from ..scene.scene import Scene
     from ..scene.state import State
+    from .opening import Way
 
 _WORKSPACES = "_workspaces"  # of the solver, by thread
 
@@ -59,6 +60,9 @@ class Role:
     name: str
     opening: float | None = None
     fitted: bool = False
+
+
+_WORKSPACES = ("systems", "way")  # attributes that are made anew in every process
 
 
 class Design(ABC):
@@ -129,18 +133,27 @@ class Design(ABC):
 
     @property
     def systems(self) -> dict[str, System]:
-        """Solver workspaces, one a role, made at first use: each thread has its own."""
+        """Solver workspaces by the names of scenes (the roles', and of stations on the way), made
+        at first use: each thread has its own."""
         own = self.__dict__.setdefault(_WORKSPACES, threading.local())
         if not hasattr(own, "systems"):
-            from ..equilibrium.system import System
-
-            own.systems = {role.name: System(self.scene(role.name)) for role in self.roles}
+            own.systems = _Systems(self)
         return own.systems
 
     def __getstate__(self) -> dict[str, Any]:
         """What travels to another process: everything but the solver workspaces, which are made
         anew there."""
         return {key: value for key, value in self.__dict__.items() if key != _WORKSPACES}
+
+    @cached_property
+    def way(self) -> Way | None:
+        """The way from the assembly to the deployed state; None for what is assembled in place."""
+        return None
+
+    def assembled(self, q: np.ndarray, equilibria: Mapping[str, Equilibrium]) -> Start:
+        """Where the way begins, for parameters q; equilibria of other roles than the fitted one are
+        known already."""
+        raise NotImplementedError(f"{self.class_name} designs are assembled in place")
 
     @property
     def free(self) -> np.ndarray:
@@ -152,6 +165,19 @@ class Design(ABC):
     @property
     def n_elements(self) -> int:
         return sum(len(group.indices) for group in self.groups)
+
+
+class _Systems(dict[str, "System"]):
+    """A design's workspaces, each made when it is first asked for."""
+
+    def __init__(self, design: Design):
+        super().__init__()
+        self._design = design
+
+    def __missing__(self, name: str) -> System:
+        from ..equilibrium.system import System
+
+        return self.setdefault(name, System(self._design.scene(name)))
 
 
 Reader = Callable[[Mapping[str, Any], str], Design]

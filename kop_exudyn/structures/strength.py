@@ -30,7 +30,7 @@ from ..rods.sections import Material, Section
 from ..scene.scene import Scene
 from .base import Design
 
-_TRANSVERSE = 1.5  # largest over mean shear stress of a transverse force
+TRANSVERSE = 1.5  # largest over mean shear stress of a transverse force
 _SAME_STIFFNESS = 1e-9  # relative
 
 
@@ -87,10 +87,10 @@ def rod_strength(
     n = len(scene.elements)
     lengths = scene.rest_lengths(equilibrium.q)
     axial, normal, shear, equivalent = np.full((4, n), np.nan)
-    for section, elements in _by_section(scene):
+    for section, elements in by_section(scene):
         rows = section_stress(section, equilibrium.stress[elements], lengths[elements])
         axial[elements], normal[elements], shear[elements], equivalent[elements] = rows
-    for section, elements, end in _cut_ends(scene):
+    for section, elements, end in cut_ends(scene):
         rows = section_stress(section, equilibrium.stress[elements], lengths[elements], (end,))
         for whole, at_cut in zip((normal, shear, equivalent), rows[1:]):
             whole[elements] = np.maximum(whole[elements], at_cut)
@@ -131,7 +131,7 @@ def material_values(
     choose : which value, where several materials do
     """
     values = np.full(len(scene.elements), np.nan)
-    for section, elements in _by_section(scene):
+    for section, elements in by_section(scene):
         for material in materials:
             value = getattr(material, name)
             if value is not None:
@@ -155,7 +155,7 @@ def _materials_in(values: Any, depth: int) -> Iterator[Material]:
             yield from _materials_in(vars(value).values(), depth - 1)
 
 
-def _by_section(scene: Scene) -> Iterator[tuple[Section, np.ndarray]]:
+def by_section(scene: Scene) -> Iterator[tuple[Section, np.ndarray]]:
     """Each section of the scene with its elements."""
     elements: dict[int, tuple[Section, list[np.ndarray]]] = {}
     for chain in scene.chains:
@@ -165,7 +165,7 @@ def _by_section(scene: Scene) -> Iterator[tuple[Section, np.ndarray]]:
         yield section, np.concatenate(parts)
 
 
-def _cut_ends(scene: Scene) -> Iterator[tuple[Section, np.ndarray, float]]:
+def cut_ends(scene: Scene) -> Iterator[tuple[Section, np.ndarray, float]]:
     """What is left of the sections that joints cut, with the elements that begin (-0.5) or end
     (0.5) there."""
     found: dict[tuple[int, float], tuple[Section, list[int]]] = {}
@@ -196,6 +196,6 @@ def section_stress(
     )
     normal = np.abs(axial[:, None] + bending).max(axis=(0, 2))
     torsion = np.abs(Mt) * section.torsion_modulus / section.torsion
-    shear = torsion + _TRANSVERSE * np.hypot(Qy, Qz) / section.area
+    shear = torsion + TRANSVERSE * np.hypot(Qy, Qz) / section.area
     corner, middle = np.hypot(normal, np.sqrt(3) * torsion), np.hypot(axial, np.sqrt(3) * shear)
     return axial, normal, shear, np.maximum(corner, middle)

@@ -13,6 +13,7 @@ imperfection that unfolds the pitchfork.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -32,9 +33,14 @@ from ...rods.sections import material_from_dict, section_from_dict
 from ...scene.scene import Scene
 from ..base import Design, Role, Target, register_class, register_rescaling
 from ..mesh_target import load_target_mesh, target_on_mesh
+from ..opening import Station, Way
 from .opening import check_hinges, check_opening
 from .scene import RodModel, lay_out, shell_scene
 
+log = logging.getLogger(__name__)
+
+_STATION_STEP = 0.2  # rad of mean joint angle between the stations on the way
+_FLAT = 1e-4  # of the size: less height is none
 _OPENING_STEP = 0.1  # rad of mean joint angle a step
 _LARGEST_CORNER = 2.5  # rad
 _IMPERFECTION = 1e-3  # of the size, height of the shallow surface that imperfect rest shapes follow
@@ -124,26 +130,87 @@ class CShell(Design):
         return path
 
     def deploy(self, q: np.ndarray | None = None) -> dict[str, Equilibrium]:
-        """Deployed from the smooth design's deployed state (the same branch), rest from the flat
-        network."""
+        """Rest from the flat network; deployed from there, as a builder opens it.
+
+        Where no equilibrium is found on that way, the deployed state is the one that the smooth
+        design's leads to.
+        """
         q = self.parameters if q is None else q
+        try:
+            start = Start(self.scene("rest").initial)
+            rest = solve(self.systems["rest"], q, start, self._rest_opening)
+            check_hinges(self.network, rest.state)
+        except SimulationFailure as failure:
+            raise failure.within("rest state") from None
+        try:
+            deployed = self._opened_or_led(q, rest)
+            check_hinges(self.network, deployed.state)
+        except SimulationFailure as failure:
+            raise failure.within("deployed state") from None
+        return {"deployed": deployed.after(*self.smooth_path), "rest": rest}
+
+    def _opened_or_led(self, q: np.ndarray, rest: Equilibrium) -> Equilibrium:
+        try:
+            opened = self.way.opened(self.systems, q, self.assembled(q, {"rest": rest}))
+            return opened[-1].after(*opened[:-1])
+        except SimulationFailure as failure:
+            log.warning("%s doesn't open from its flat assembly: %s", self.name, failure)
+        return self._led(q)
+
+    def _led(self, q: np.ndarray) -> Equilibrium:
+        """The deployed state that the smooth design's leads to."""
         path = self.smooth_path
-        starts = {
-            "deployed": Start(
-                self.layout.straightened(path[-1].state, self.scene("deployed")), path[-1].torque
-            ),
-            "rest": Start(self.scene("rest").initial),
-        }
-        found = {}
-        for role in self.roles:
-            try:
-                found[role.name] = solve(
-                    self.systems[role.name], q, starts[role.name], role.opening
-                )
-                check_hinges(self.network, found[role.name].state)
-            except SimulationFailure as failure:
-                raise failure.within(f"{role.name} state") from None
-        return {**found, "deployed": found["deployed"].after(*path)}
+        start = self.layout.straightened(path[-1].state, self.scene("deployed"))
+        return solve(
+            self.systems["deployed"],
+            q,
+            Start(start, path[-1].torque),
+            self.fitted_role.opening,
+        )
+
+    @cached_property
+    def way(self) -> Way:
+        """From the flat assembly by growing mean angles, to the side that the smooth design rises
+        to."""
+        end = self.fitted_role.opening
+        assert end is not None
+        free = self.systems["deployed"].sparsity.free
+        steps = max(1, int(np.ceil(abs(end - self._rest_opening) / _STATION_STEP - 1e-9)))
+        stations = tuple(
+            Station(
+                f"opened by {k / steps:.0%}",
+                "deployed",
+                self._rest_opening + (end - self._rest_opening) * k / steps,
+                self._heights(k / steps)[free],
+            )
+            for k in range(1, steps + 1)
+        )
+        return Way(
+            self._rest_opening, stations[:-1], stations[-1], self.joints, self.target.diagonal
+        )
+
+    def assembled(self, q: np.ndarray, equilibria: Mapping[str, Equilibrium]) -> Start:
+        """The rest state, off the floor."""
+        return Start(equilibria["rest"].state, equilibria["rest"].torque)
+
+    @property
+    def _rest_opening(self) -> float:
+        """Mean angle of the assembly."""
+        opening = next(role.opening for role in self.roles if role.name == "rest")
+        assert opening is not None
+        return opening
+
+    def _heights(self, share: float) -> np.ndarray:
+        """(n_dofs,) heights of the smooth design opened by a share, or as soon as it isn't flat."""
+        path = self.smooth_path
+        first = min(len(path) - 1, int(np.ceil(share * (len(path) - 1) - 1e-9)))
+        out = np.zeros(self.scene("deployed").n_dofs)
+        places = out[: 6 * len(self.layout.smooth)].reshape(-1, 6)
+        for equilibrium in path[first:]:
+            places[:, 2] = equilibrium.state.positions[:, 2]
+            if np.ptp(places[:, 2]) > _FLAT * self.network.size:
+                break
+        return out
 
     @cached_property
     def target(self) -> Target:

@@ -1,0 +1,175 @@
+"""The way from a design's assembly to its deployed state, as a builder goes it.
+
+The way is a sequence of stations: the growing mean angles of a C-shell, say. Opened from the
+assembly, each station's state is solved from the one before it, and the last one leads to the
+deployed state. Once these states are known for one design, those of a design with other parameters
+are predicted from them by sensitivities and corrected; what is left to verify is that each state
+leads into the next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..equilibrium.equilibria import Equilibrium, Start
+from ..equilibrium.newton import NewtonOptions, solve
+from ..equilibrium.sensitivities import Sensitivities
+from ..equilibrium.system import System
+from ..errors import SimulationFailure
+from .fitting import best_placement
+
+SAME_STATE = 1e-3  # of the bounding box: states whose joints are this close are one
+_FLAT = 1e-4  # of the joints' extent: less than that out of their plane is none
+_MOST_ITERATIONS = 80  # of a correction; what takes longer isn't near the predicted state
+_PARTS = (1, 2, 4)  # of the way between two stations that one is led to the other in
+
+
+@dataclass(frozen=True)
+class Station:
+    """A state on the way from the assembly to the deployed design.
+
+    name : as messages and results have it
+    scene : name of the scene that it is a state of, see `Design.systems`
+    opening : rad, prescribed mean hinge angle, or None without actuation
+    side : (n_free,) direction out of the assembly's plane that the builder pushes to, or None
+    """
+
+    name: str
+    scene: str
+    opening: float | None = None
+    side: np.ndarray | None = None
+
+    @property
+    def options(self) -> NewtonOptions:
+        return NewtonOptions(side=self.side)
+
+
+@dataclass(frozen=True)
+class Way:
+    """The stations of a design.
+
+    opening : mean angle of the assembly, or None without actuation
+    stations : on the way, in order
+    deployed : where the way ends
+    joints : (n_joints,) bodies by which states are compared
+    diagonal : size to which distances are relative
+
+    The methods' `systems` are the design's workspaces, by the names of scenes.
+    """
+
+    opening: float | None
+    stations: tuple[Station, ...]
+    deployed: Station
+    joints: np.ndarray
+    diagonal: float
+
+    def opened(
+        self, systems: Mapping[str, System], q: np.ndarray, assembled: Start
+    ) -> list[Equilibrium]:
+        """The states at all stations and the deployed one, each solved from the one before.
+
+        Mean angles grow in half the steps from station to station. Iterations of a state count
+        those of the half-step before it. Raises SimulationFailure, naming the station, where none
+        is found.
+        """
+        found: list[Equilibrium] = []
+        before: Start | Equilibrium = assembled
+        opening = self.opening
+        for station in (*self.stations, self.deployed):
+            system, passed = systems[station.scene], []
+            try:
+                if opening is not None and station.opening is not None:
+                    half = 0.5 * (opening + station.opening)
+                    passed = [solve(system, q, before, half, station.options)]
+                start = passed[-1] if passed else before
+                here = solve(system, q, start, station.opening, station.options)
+            except SimulationFailure as failure:
+                raise failure.within(station.name) from None
+            found.append(here.after(*passed))
+            before, opening = here, station.opening
+        return found
+
+    def followed(
+        self,
+        systems: Mapping[str, System],
+        q: np.ndarray,
+        known: Sequence[Equilibrium],
+        deployed: Equilibrium,
+    ) -> list[Equilibrium]:
+        """The states at the stations, from those known at other parameters.
+
+        Each is verified to lead into the next, the last one into `deployed`; only between states in
+        the assembly's plane there is nothing to verify. Raises SimulationFailure, naming the
+        station, where the way breaks.
+        """
+        found = []
+        for station, old in zip(self.stations, known):
+            system = systems[station.scene]
+            try:
+                start = Sensitivities(system, old).predict(q - old.q)
+                options = replace(station.options, max_iterations=_MOST_ITERATIONS)
+                found.append(solve(system, q, start, station.opening, options))
+            except SimulationFailure as failure:
+                raise failure.within(station.name) from None
+        ends = [*self.stations[1:], self.deployed]
+        for station, end, here, ahead in zip(self.stations, ends, found, [*found[1:], deployed]):
+            if not self.is_flat(here):
+                self._verify(systems[station.scene], systems[end.scene], station, here, ahead)
+        return found
+
+    def _verify(
+        self,
+        system: System,
+        next_system: System,
+        station: Station,
+        here: Equilibrium,
+        ahead: Equilibrium,
+    ) -> None:
+        """Raise SimulationFailure unless a state leads into the one ahead.
+
+        In one step first; a step that is too long may miss the branch, so more and shorter ones are
+        taken before the way counts as broken.
+        """
+        moved = np.inf
+        for parts in _PARTS if system is next_system and ahead.opening is not None else (1,):
+            try:
+                arrived = _led(system, next_system, here, ahead, parts)
+            except SimulationFailure:
+                continue
+            moved = self.apart(arrived, ahead)
+            if moved <= SAME_STATE:
+                return
+        where = "no state that is found" if np.isinf(moved) else "another state"
+        away = "" if np.isinf(moved) else f", {100 * moved:.2g} % of its size away"
+        raise SimulationFailure(f"opens into {where}{away}", where=station.name)
+
+    def is_flat(self, state: Equilibrium) -> bool:
+        """Whether the joints lie in one plane."""
+        x = state.state.positions[self.joints]
+        sizes = np.linalg.svd(x - x.mean(axis=0), compute_uv=False)
+        return bool(sizes[2] <= _FLAT * sizes[0])
+
+    def apart(self, a: Equilibrium, b: Equilibrium) -> float:
+        """The largest distance of a joint in two states at their best placement, as a share of
+        the size."""
+        x, y = (e.state.positions[self.joints] for e in (a, b))
+        placed = best_placement(x, y, np.full(len(x), 1 / len(x))).apply(x)
+        return float(np.linalg.norm(placed - y, axis=1).max()) / self.diagonal
+
+
+def _led(
+    system: System, next_system: System, here: Equilibrium, ahead: Equilibrium, parts: int
+) -> Equilibrium:
+    """The state that one leads to at the opening of the one ahead, in equal parts of the way."""
+    options = NewtonOptions(max_iterations=_MOST_ITERATIONS)
+    if here.opening is None or ahead.opening is None or system is not next_system:
+        return solve(next_system, ahead.q, here, ahead.opening, options)
+    step, state = (ahead.opening - here.opening) / parts, here
+    for k in range(1, parts + 1):
+        start = Sensitivities(system, state).predict(np.zeros_like(state.q), step)
+        opening = ahead.opening if k == parts else here.opening + k * step
+        state = solve(system, ahead.q, start, opening, options)
+    return state
