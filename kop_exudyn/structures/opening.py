@@ -24,6 +24,7 @@ from .fitting import best_placement
 SAME_STATE = 1e-3  # of the bounding box: states whose joints are this close are one
 _FLAT = 1e-4  # of the joints' extent: less than that out of their plane is none
 _MOST_ITERATIONS = 80  # of a correction; what takes longer isn't near the predicted state
+_HALVINGS = 4  # of a step that leaves the assembly's plane
 _PARTS = (1, 2, 4)  # of the way between two stations that one is led to the other in
 
 
@@ -71,25 +72,26 @@ class Way:
     ) -> list[Equilibrium]:
         """The states at all stations and the deployed one, each solved from the one before.
 
-        Mean angles grow in half the steps from station to station. Iterations of a state count
-        those of the half-step before it. Raises SimulationFailure, naming the station, where none
-        is found.
+        Mean angles grow in half the steps from station to station, and in shorter ones where the
+        assembly leaves its plane: far beyond the bifurcation an iteration may end on the other
+        side. Iterations of a state count those of all steps to it. Raises SimulationFailure, naming
+        the station, where none is found.
         """
         found: list[Equilibrium] = []
         before: Start | Equilibrium = assembled
         opening = self.opening
         for station in (*self.stations, self.deployed):
-            system, passed = systems[station.scene], []
+            system, steps = systems[station.scene], [station.opening]
+            if opening is not None and station.opening is not None:
+                steps = [0.5 * (opening + station.opening), station.opening]
+            passed: list[Equilibrium] = []
             try:
-                if opening is not None and station.opening is not None:
-                    half = 0.5 * (opening + station.opening)
-                    passed = [solve(system, q, before, half, station.options)]
-                start = passed[-1] if passed else before
-                here = solve(system, q, start, station.opening, station.options)
+                for to in steps:
+                    passed += _opened_to(system, q, before, opening, to, station, _HALVINGS)
+                    before, opening = passed[-1], to
             except SimulationFailure as failure:
                 raise failure.within(station.name) from None
-            found.append(here.after(*passed))
-            before, opening = here, station.opening
+            found.append(passed[-1].after(*passed[:-1]))
         return found
 
     def followed(
@@ -158,6 +160,33 @@ class Way:
         x, y = (e.state.positions[self.joints] for e in (a, b))
         placed = best_placement(x, y, np.full(len(x), 1 / len(x))).apply(x)
         return float(np.linalg.norm(placed - y, axis=1).max()) / self.diagonal
+
+
+def _opened_to(
+    system: System,
+    q: np.ndarray,
+    before: Start | Equilibrium,
+    opening: float | None,
+    to: float | None,
+    station: Station,
+    halvings: int,
+) -> list[Equilibrium]:
+    """The states on a step to another opening; it is halved where the wrong side is taken."""
+    here = solve(system, q, before, to, station.options)
+    wrong = here.escapes > 0 and station.side is not None and _height(system, here, station) < 0
+    if not wrong or opening is None or to is None or not halvings:
+        return [here]
+    half = 0.5 * (opening + to)
+    first = _opened_to(system, q, before, opening, half, station, halvings - 1)
+    return first + _opened_to(system, q, first[-1], half, to, station, halvings - 1)
+
+
+def _height(system: System, state: Equilibrium, station: Station) -> float:
+    """How far a state lies to the side that a builder pushes to."""
+    places = np.zeros(system.scene.n_dofs)
+    positions = state.state.positions
+    places[: 6 * len(positions)].reshape(-1, 6)[:, :3] = positions
+    return float(places[system.sparsity.free] @ station.side)
 
 
 def _led(
