@@ -54,7 +54,6 @@ def assigned_stage(
     numbers : of the rounds, where this isn't the first call: every SQP has a name of its own
     """
     settings = stages.settings
-    start = stages.kept(start)
     if settings.reassignments == 0:
         name = "assigned" if numbers is None else f"assigned-{next(numbers)}"
         return stages.assigned(start, name) if stages.rule.parts_move else start
@@ -76,32 +75,40 @@ def assigned_stage(
 
 
 def opened_stage(stages: Stages, start: StageResult) -> StageResult:
-    """Designs that open into their shape by themselves, or nearly: rounds from where they open
-    into, again and again.
+    """Designs that open into their shape by themselves: rounds from where they open into, again and
+    again.
 
-    The states of the assigned stage are led to from the relaxed ones. Opened from its assembly, a
-    design may end in another stable state; with rounds from there, the optimisation works on the
-    states that a builder will find. Of all results the one is returned whose designs, opened from
-    their assembly, have the lowest J.
+    The states of the assigned stage are led to from the relaxed ones, by ways that no builder goes:
+    the search is freer so. Opened from its assembly, a design may end in another stable state; with
+    rounds from there, the optimisation works on the states that a builder will find. Where they
+    still aren't the same in the end, the best of these states are kept, and the parts optimised
+    once more in steps that each keep every design on the branch that it opens along.
+
+    The result's states are those that the designs open into, unless one doesn't open at all.
     """
     settings = stages.settings
-    best, best_value = start, np.inf
-    result, numbers = start, count(2 + settings.reassignments + settings.leaps * (1 + _AFTER_LEAP))
+    if not stages.required.opening:
+        return start
+    best, led, result = None, start, start
+    numbers = count(2 + settings.reassignments + settings.leaps * (1 + _AFTER_LEAP))
     for number in range(settings.redeployments + 1):
-        found = stages.redeployed(result)
-        opened = stages.judged(replace(result, designs=found))
-        if _value(opened) < best_value or number == 0:
-            best, best_value = result, _value(opened)
-        if (
-            number == settings.redeployments
-            or opened.value is None
-            or _all_same(stages, result, opened)
-        ):
+        opened = stages.judged(replace(result, designs=stages.redeployed(result)))
+        if opened.value is not None and (best is None or _value(opened) < _value(best)):
+            best, led = opened, result
+        same = _all_same(stages, result, opened)
+        if number == settings.redeployments or opened.value is None or same:
             break
         opened = stages.confirmed(opened)
         if opened.value is None:
             break
         result = assigned_stage(stages, opened, numbers)
+    if best is None or _all_same(stages, led, best):
+        return replace(led, jumps=start.jumps)
+    best = stages.kept(best)
+    if stages.rule.parts_move and best.value is not None:
+        secured = stages.assigned(best, f"assigned-{next(numbers)}", secured=True)
+        secured = replace(secured, steps=led.steps + secured.steps)
+        best = min((best, secured), key=_value)
     return replace(best, jumps=start.jumps)
 
 
@@ -193,7 +200,7 @@ def _best_trial(stages: Stages, best: StageResult) -> StageResult | None:
     found = [trial for trial in trials if trial is not None]
     if not found or _value(trial := min(found, key=_value)) >= _PATIENCE * _value(best):
         return None
-    trial = stages.kept(trial)
+    trial = stages.confirmed(trial)
     return trial if trial.value is not None else None
 
 
@@ -260,7 +267,7 @@ def _bold_trials(stages: Stages, best: StageResult) -> list[StageResult]:
             found.append(trial[0])
         if len(found) == _TRIALS:
             break
-    confirmed = [stages.kept(trial) for trial in sorted(found, key=_value)]
+    confirmed = [stages.confirmed(trial) for trial in sorted(found, key=_value)]
     return [trial for trial in confirmed if trial.value is not None]
 
 

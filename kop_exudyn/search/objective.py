@@ -75,9 +75,12 @@ class Weights:
     def suiting(
         cls, designs: Sequence[Design], values: Mapping[str, float] | None = None
     ) -> Weights:
-        """Weights with the fit weight that suits the designs' class (see `Design.fit_weight`),
-        unless values say else."""
-        return cls.of({"fit": max(design.fit_weight for design in designs), **(values or {})})
+        """Weights of fit and stress that suit the designs' class (see `Design.fit_weight`,
+        `Design.stress_weight`), unless values say else."""
+        own = {"fit": max(design.fit_weight for design in designs)}
+        if stress := max(design.stress_weight for design in designs):
+            own["stress"] = stress
+        return cls.of({**own, **(values or {})})
 
     def of_terms(self) -> dict[str, float]:
         """Weights by the terms' names."""

@@ -22,6 +22,7 @@ from .assigned import assigned_stage, opened_stage
 from .dataset import Dataset
 from .objective import Weights
 from .pool import DesignPool
+from .requirements import Requirements
 from .result import KitResult
 from .settings import JobSettings
 from .stage_results import StageEvent
@@ -77,9 +78,9 @@ def optimize_kit(
         pool.prepare()
         weights = settings.weights or Weights.suiting(designs)
         dataset = Dataset.of_pool(pool, weights, settings.design_weights)
-        baselines = Stages(dataset, sought, settings.stages, store, observe)
-        required = dataset.requiring(settings.stages.requirements)
-        stages = Stages(required, sought, settings.stages, store, observe)
+        free = replace(settings.stages, requirements=Requirements.none())
+        baselines = Stages(dataset, sought, free, store, observe)
+        stages = Stages(dataset, sought, settings.stages, store, observe)
         result = KitResult(list(designs), pool.references, events=events)
         found = result.stages
         if start is not None:
@@ -98,8 +99,7 @@ def optimize_kit(
         announce("assigned stage")
         found["assigned"] = assigned_stage(stages, found["built"])
         announce("deployment of the assigned designs")
-        if settings.stages.redeployments:
-            found["assigned"] = opened_stage(stages, found["assigned"])
+        found["assigned"] = opened_stage(stages, found["assigned"])
         result.redeployed = stages.redeployed(found["assigned"])
         if "direct" in found:
             announce("bound on the clustering")

@@ -69,7 +69,10 @@ class Stages:
         self.schedule = settings.schedule or tuple(
             k * (weights.fit or weights.energy) for k in (0.1, 1.0, 10.0, 100.0)
         )
-        self.dataset, self.settings = dataset, settings
+        # the search may pass through states that are led to; what it returns opens
+        self.required = settings.requirements
+        self.dataset = dataset.requiring(replace(self.required, opening=False))
+        self.settings = settings
         self.rule = rule_of(parts, dataset.group_designs)
         self.store, self.observer = store or NoStore(), observer or (lambda event: None)
         self.q0 = dataset.parameters
@@ -120,16 +123,19 @@ class Stages:
         name: str = "assigned",
         max_steps: int | None = None,
         tolerance: float | None = None,
+        secured: bool = False,
     ) -> StageResult:
         """Minimise over the parts from a state in which every element is its part; designs that
         failed stay out.
 
         max_steps, tolerance : default: the settings' `assigned_steps` and `assigned_tolerance`
+        secured : from states that `kept` gave, in steps that keep every design on the branch along
+            which it opens
         """
         members = [n for n, e in enumerate(start.designs) if isinstance(e, Evaluation)]
         if not members:
             return replace(start, status="no design could be built from the kit", jumps=[])
-        problem = self.assigned_problem(start, members)
+        problem = self.assigned_problem(start, members, secured)
         try:
             check_feasible(problem.lower, problem.upper, problem.constraints)
         except InputError as error:
@@ -157,8 +163,11 @@ class Stages:
         )
         return self.confirmed(replace(found, pressure=_pressure(result)))
 
-    def assigned_problem(self, start: StageResult, members: Sequence[int]) -> AssignedProblem:
-        """The problem over the parts, for some of the designs."""
+    def assigned_problem(
+        self, start: StageResult, members: Sequence[int], secured: bool = False
+    ) -> AssignedProblem:
+        """The problem over the parts, for some of the designs, perhaps with their openings."""
+        dataset = self.dataset.requiring(self.required) if secured else self.dataset
         constraints = self.settings.constraints
         if constraints is not None and len(members) < len(self.dataset.designs):
             offsets = self.dataset.offsets
@@ -166,7 +175,7 @@ class Stages:
                 np.concatenate([np.arange(offsets[n], offsets[n + 1]) for n in members])
             )
         return AssignedProblem(
-            self.dataset.subset(members),
+            dataset.subset(members),
             start.kit,
             restrict(start.assignment, self.dataset, members),
             self.settings.bounds,
@@ -202,13 +211,11 @@ class Stages:
 
         A design for which no such state is found keeps the one it is in.
         """
-        if not self.dataset.requirements.opening:
-            return result
         found = {
             n: d for n, d in enumerate(result.designs) if isinstance(d, Evaluation) and not d.way
         }
         designs = list(result.designs)
-        for n, evaluation in self.dataset.open(found).items():
+        for n, evaluation in self.dataset.requiring(self.required).open(found).items():
             if isinstance(evaluation, SimulationFailure):
                 log.info("%s", evaluation)
             else:

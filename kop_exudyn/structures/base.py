@@ -85,6 +85,9 @@ class Design(ABC):
     fit_weight: ClassVar[float] = 1e4
     # Whether rods lie beside the target, so that only the joints' distances from it count.
     beside_target: ClassVar[bool] = False
+    # Weight of the stress, over the input design's: where highly stressed designs have several
+    # stable states, a little of it leads the search to those that open by themselves.
+    stress_weight: ClassVar[float] = 0.0
     # Typical change of parameters that belong to no element.
     free_scale: float = 1.0
     # What acts on the deployed design; the search for a kit is for the unloaded one.

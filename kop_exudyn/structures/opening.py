@@ -13,13 +13,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ..equilibrium.equilibria import Equilibrium, Start
 from ..equilibrium.newton import NewtonOptions, solve
 from ..equilibrium.sensitivities import Sensitivities
 from ..equilibrium.system import System
 from ..errors import SimulationFailure
-from .fitting import best_placement
 
 SAME_STATE = 1e-3  # of the bounding box: states whose joints are this close are one
 _FLAT = 1e-4  # of the joints' extent: less than that out of their plane is none
@@ -158,8 +158,9 @@ class Way:
         """The largest distance of a joint in two states at their best placement, as a share of
         the size."""
         x, y = (e.state.positions[self.joints] for e in (a, b))
-        placed = best_placement(x, y, np.full(len(x), 1 / len(x))).apply(x)
-        return float(np.linalg.norm(placed - y, axis=1).max()) / self.diagonal
+        x, y = x - x.mean(axis=0), y - y.mean(axis=0)
+        turn, _ = Rotation.align_vectors(y, x)
+        return float(np.linalg.norm(turn.apply(x) - y, axis=1).max()) / self.diagonal
 
 
 def _opened_to(

@@ -63,6 +63,7 @@ class CShell(Design):
     """
 
     class_name = "c_shell"
+    stress_weight = 0.1
 
     def __init__(
         self,
@@ -132,10 +133,10 @@ class CShell(Design):
     def deploy(self, q: np.ndarray | None = None) -> dict[str, Equilibrium]:
         """Rest from the flat network; deployed from there, as a builder opens it.
 
-        Where no equilibrium is found on that way, the deployed state is the one that the smooth
-        design's leads to.
+        Where no equilibrium is found on that way, the input's deployed state is the one that the
+        smooth design's leads to.
         """
-        q = self.parameters if q is None else q
+        given, q = q is not None, self.parameters if q is None else q
         try:
             start = Start(self.scene("rest").initial)
             rest = solve(self.systems["rest"], q, start, self._rest_opening)
@@ -143,16 +144,19 @@ class CShell(Design):
         except SimulationFailure as failure:
             raise failure.within("rest state") from None
         try:
-            deployed = self._opened_or_led(q, rest)
+            deployed = self._opened(q, rest) if given else self._opened_or_led(q, rest)
             check_hinges(self.network, deployed.state)
         except SimulationFailure as failure:
             raise failure.within("deployed state") from None
         return {"deployed": deployed.after(*self.smooth_path), "rest": rest}
 
+    def _opened(self, q: np.ndarray, rest: Equilibrium) -> Equilibrium:
+        opened = self.way.opened(self.systems, q, self.assembled(q, {"rest": rest}))
+        return opened[-1].after(*opened[:-1])
+
     def _opened_or_led(self, q: np.ndarray, rest: Equilibrium) -> Equilibrium:
         try:
-            opened = self.way.opened(self.systems, q, self.assembled(q, {"rest": rest}))
-            return opened[-1].after(*opened[:-1])
+            return self._opened(q, rest)
         except SimulationFailure as failure:
             log.warning("%s doesn't open from its flat assembly: %s", self.name, failure)
         return self._led(q)
