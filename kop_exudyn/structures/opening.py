@@ -103,50 +103,48 @@ class Way:
     ) -> list[Equilibrium]:
         """The states at the stations, from those known at other parameters.
 
-        Each is verified to lead into the next, the last one into `deployed`; only between states in
-        the assembly's plane there is nothing to verify. Raises SimulationFailure, naming the
-        station, where the way breaks.
+        A state that has left the assembly's plane has to lead into the next one, and the last into
+        `deployed`; those in the plane, and the first one out of it, are predicted from the known
+        ones. A step that is too long may miss the branch, so more and shorter ones are taken before
+        the way counts as broken. Raises SimulationFailure, naming the station, where it does.
         """
-        found = []
-        for station, old in zip(self.stations, known):
-            system = systems[station.scene]
+        reason = SimulationFailure("no station", where=self.deployed.name)
+        for parts in _PARTS:
             try:
-                start = Sensitivities(system, old).predict(q - old.q)
-                options = replace(station.options, max_iterations=_MOST_ITERATIONS)
-                found.append(solve(system, q, start, station.opening, options))
+                found = self._chain(systems, q, known, deployed, parts)
+            except SimulationFailure as failure:
+                reason = failure
+                continue
+            moved = self.apart(found[-1], deployed)
+            if moved <= SAME_STATE:
+                return found[:-1]
+            reason = SimulationFailure(
+                f"opens into another state, {100 * moved:.2g} % of its size away"
+            )
+        raise reason
+
+    def _chain(
+        self,
+        systems: Mapping[str, System],
+        q: np.ndarray,
+        known: Sequence[Equilibrium],
+        deployed: Equilibrium,
+        parts: int,
+    ) -> list[Equilibrium]:
+        """The states at the stations, each led to in so many steps, and where they lead to."""
+        found: list[Equilibrium] = []
+        for number, (station, near) in enumerate(
+            zip((*self.stations, self.deployed), (*known, deployed))
+        ):
+            try:
+                if found and not self.is_flat(found[-1]):
+                    before = systems[self.stations[number - 1].scene]
+                    found.append(_led(before, systems[station.scene], q, found[-1], station, parts))
+                else:
+                    found.append(_near(systems[station.scene], q, near, station))
             except SimulationFailure as failure:
                 raise failure.within(station.name) from None
-        ends = [*self.stations[1:], self.deployed]
-        for station, end, here, ahead in zip(self.stations, ends, found, [*found[1:], deployed]):
-            if not self.is_flat(here):
-                self._verify(systems[station.scene], systems[end.scene], station, here, ahead)
         return found
-
-    def _verify(
-        self,
-        system: System,
-        next_system: System,
-        station: Station,
-        here: Equilibrium,
-        ahead: Equilibrium,
-    ) -> None:
-        """Raise SimulationFailure unless a state leads into the one ahead.
-
-        In one step first; a step that is too long may miss the branch, so more and shorter ones are
-        taken before the way counts as broken.
-        """
-        moved = np.inf
-        for parts in _PARTS if system is next_system and ahead.opening is not None else (1,):
-            try:
-                arrived = _led(system, next_system, here, ahead, parts)
-            except SimulationFailure:
-                continue
-            moved = self.apart(arrived, ahead)
-            if moved <= SAME_STATE:
-                return
-        where = "no state that is found" if np.isinf(moved) else "another state"
-        away = "" if np.isinf(moved) else f", {100 * moved:.2g} % of its size away"
-        raise SimulationFailure(f"opens into {where}{away}", where=station.name)
 
     def is_flat(self, state: Equilibrium) -> bool:
         """Whether the joints lie in one plane."""
@@ -187,19 +185,40 @@ def _height(system: System, state: Equilibrium, station: Station) -> float:
     places = np.zeros(system.scene.n_dofs)
     positions = state.state.positions
     places[: 6 * len(positions)].reshape(-1, 6)[:, :3] = positions
-    return float(places[system.sparsity.free] @ station.side)
+    side = station.side
+    assert side is not None
+    return float(places[system.sparsity.free] @ side / max(np.linalg.norm(side), 1e-300))
+
+
+def _near(system: System, q: np.ndarray, near: Equilibrium, station: Station) -> Equilibrium:
+    """A station's state, predicted from one at other parameters and corrected.
+
+    Close to the bifurcation out of the plane the prediction may end on the other side; the known
+    state itself is the safer start then.
+    """
+    options = replace(station.options, max_iterations=_MOST_ITERATIONS)
+    for start in (Sensitivities(system, near).predict(q - near.q), near):
+        here = solve(system, q, start, station.opening, options)
+        if station.side is None or _height(system, here, station) >= -_FLAT * system.scene.size:
+            return here
+    raise SimulationFailure("rises to the other side")
 
 
 def _led(
-    system: System, next_system: System, here: Equilibrium, ahead: Equilibrium, parts: int
+    before: System,
+    system: System,
+    q: np.ndarray,
+    here: Equilibrium,
+    station: Station,
+    parts: int,
 ) -> Equilibrium:
-    """The state that one leads to at the opening of the one ahead, in equal parts of the way."""
+    """The state that one leads to at the next station, in equal parts of the way."""
     options = NewtonOptions(max_iterations=_MOST_ITERATIONS)
-    if here.opening is None or ahead.opening is None or system is not next_system:
-        return solve(next_system, ahead.q, here, ahead.opening, options)
-    step, state = (ahead.opening - here.opening) / parts, here
+    if here.opening is None or station.opening is None or before is not system:
+        return solve(system, q, here, station.opening, options)
+    step, state = (station.opening - here.opening) / parts, here
     for k in range(1, parts + 1):
-        start = Sensitivities(system, state).predict(np.zeros_like(state.q), step)
-        opening = ahead.opening if k == parts else here.opening + k * step
-        state = solve(system, ahead.q, start, opening, options)
+        start = Sensitivities(system, state).predict(np.zeros_like(q), step)
+        opening = station.opening if k == parts else here.opening + k * step
+        state = solve(system, q, start, opening, options)
     return state

@@ -1,117 +1,70 @@
-"""The opening angle: its sense does not depend on how the curves are listed, and it has limits."""
+"""Designs opened from their assembly, and ways followed to other parameters."""
 
-import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from kop_exudyn.analysis.simulation import simulate
-from kop_exudyn.errors import InputError, SimulationFailure
-from kop_exudyn.geometry.network import network_from_dict
-from kop_exudyn.structures.base import design_from_dict
+from kop_exudyn.equilibrium.newton import solve
+from kop_exudyn.errors import SimulationFailure
+from kop_exudyn.io.designs import load_design
+from kop_exudyn.structures.opening import SAME_STATE
 
 
-def scissor(half_angle: float, n: int = 4, turn: float = 0.0) -> list[np.ndarray]:
-    """A rhombic net of 2 n straight laths at plus and minus half an angle to the line at `turn`."""
-    u, v = (np.array([np.cos(turn + a), np.sin(turn + a)]) for a in (half_angle, -half_angle))
-    laths = [np.array([k * v - 0.2 * u, k * v + (n - 0.8) * u]) for k in range(n)]
-    return laths + [np.array([k * u - 0.2 * v, k * u + (n - 0.8) * v]) for k in range(n)]
+@pytest.fixture(scope="module")
+def shell(repository):
+    return load_design(repository / "models" / "small" / "01_sinh.json")
 
 
-def design(laths, opening: float, version: int = 2) -> dict:
-    return {
-        "format": "kop_exudyn/design",
-        "version": version,
-        "class": "c_shell",
-        "name": "scissor",
-        "material": {"young": 2.1e9, "poisson": 0.35},
-        "section": {"type": "rectangle", "width": 0.02, "height": 0.004},
-        "curves": [{"type": "polyline", "points": lath.tolist()} for lath in laths],
-        "opening": {"angle": opening},
-    }
+def opened(shell, q):
+    rest = solve(shell.systems["rest"], q, None, shell.roles[1].opening)
+    return shell.way.opened(shell.systems, q, shell.assembled(q, {"rest": rest}))
 
 
-@settings(deadline=None, max_examples=60)
-@given(
-    half=st.floats(0.1, 0.77),
-    turn=st.floats(0, 2 * np.pi),
-    seed=st.integers(0, 1000),
-)
-def test_the_acute_angle_opens_however_the_curves_are_drawn(half, turn, seed):
-    rng = np.random.default_rng(seed)
-    laths = scissor(half, turn=turn)
-    laths = [laths[k][:: rng.choice([1, -1])] for k in rng.permutation(len(laths))]
-    net = network_from_dict(design(laths, 0.1))
-    np.testing.assert_allclose(net.opening_angles, 2 * half, atol=1e-9)
+@pytest.fixture(scope="module")
+def states(shell):
+    return opened(shell, shell.parameters)
 
 
-@pytest.mark.parametrize("turn", [0.0, 0.3, -0.7, 2.0])
-def test_at_right_angles_the_family_along_x_comes_first(turn):
-    laths = scissor(np.pi / 4, turn=turn + np.pi / 4)  # families at `turn` and upright to it
-    found = set()
-    for order in (laths, laths[::-1]):
-        net = network_from_dict(design(order, 0.1))
-        first = net.directions[0, 0]
-        found.add(round(float(abs(np.cos(first))), 9))
-        assert net.opening_angles == pytest.approx(np.pi / 2)
-    assert len(found) == 1
-    (along,) = found
-    assert along >= np.sqrt(0.5) - 1e-9
+def test_a_shell_opens_into_its_target(shell, states):
+    way = shell.way
+    assert [s.opening for s in way.stations] == pytest.approx(
+        np.linspace(shell.roles[1].opening, shell.roles[0].opening, len(states) + 1)[1:-1]
+    )
+    assert way.is_flat(states[0]) and not way.is_flat(states[-1])
+    joints = states[-1].state.positions[shell.joints]
+    assert np.abs(joints - shell.target.positions).max() < 0.05 * shell.target.diagonal
 
 
-def test_files_of_version_1_open_from_the_first_curve():
-    laths = scissor(0.3)
-    for order, angle in ((laths, np.pi - 0.6), (laths[::-1], 0.6)):
-        net = network_from_dict(design(order, 0.1, version=1))
-        assert net.opening_angles == pytest.approx(angle)
+def test_it_rises_to_the_side_that_is_asked_for(repository, shell, states):
+    """Both sides are equivalent, and only the push of the builder tells them apart."""
+    other = load_design(repository / "models" / "small" / "01_sinh.json")
+    other.side = -shell.side
+    mirrored = opened(other, other.parameters)[-1]
+    z, w = (s.state.positions[shell.joints, 2] for s in (states[-1], mirrored))
+    assert np.allclose(z, -w, atol=1e-6 * shell.target.diagonal)
 
 
-def test_both_orders_open_into_the_same_shape():
-    laths = scissor(0.5, 3)
-    states = [simulate(design_from_dict(design(order, 0.5))) for order in (laths, laths[::-1])]
-    sizes = [np.sort(np.linalg.norm(s.joints - s.joints.mean(axis=0), axis=1)) for s in states]
-    np.testing.assert_allclose(sizes[0], sizes[1], atol=1e-6)
-    for state in states:
-        assert state.to_dict()["opening_angle"] == pytest.approx(1.5)
-        assert state.to_dict()["assembly_angle"] == pytest.approx(1.0)
+def test_ways_are_followed_to_other_parameters(shell, states):
+    q = shell.parameters * (1 + 2e-3 * np.random.default_rng(0).standard_normal(len(states[0].q)))
+    fresh = opened(shell, q)
+    followed = shell.way.followed(shell.systems, q, states[:-1], fresh[-1])
+    for a, b in zip(followed, fresh):
+        assert shell.way.apart(a, b) < 1e-6 or shell.way.is_flat(b)
 
 
-@pytest.mark.parametrize("opening", [-1.1, 2.2])
-def test_a_scissor_stops_where_it_is_closed(opening):
-    with pytest.raises(InputError, match="opening.angle = .* from 57.3° to") as caught:
-        design_from_dict(design(scissor(0.5), opening))
-    assert "an opening between -57.3 and 122.7° is possible" in str(caught.value)
+def test_a_way_that_leads_elsewhere_is_refused(shell, states):
+    """The deployed state's mirror image is an equilibrium as well, on the other side."""
+    positions = states[-1].state.positions * [1, 1, -1]
+    flip = np.diag([1.0, 1.0, -1.0])
+    rotations = flip @ states[-1].state.rotations @ flip
+    mirror = replace(states[-1].state, positions=positions, rotations=rotations)
+    deployed = solve(shell.systems["deployed"], shell.parameters, mirror, shell.roles[0].opening)
+    assert shell.way.apart(deployed, states[-1]) > SAME_STATE
+    with pytest.raises(SimulationFailure, match="another state"):
+        shell.way.followed(shell.systems, shell.parameters, states[:-1], deployed)
 
 
-def test_a_braced_net_is_not_opened_by_spinning_a_hinge(triaxial):
-    """Three families of laths: their triangles keep all angles, so only a hinge that passes
-    through the closed position could meet the mean."""
-    with pytest.raises(SimulationFailure, match="takes the two through each other"):
-        simulate(design_from_dict(triaxial))
-
-
-@pytest.fixture
-def triaxial() -> dict:
-    """Three families, each lath crossing those of the other two away from their crossings."""
-    laths = [np.array([[-0.2, y], [4.2, y]]) for y in (0.5, 1.4, 2.3)]
-    for sign in (1, -1):
-        along = np.array([0.5, sign * np.sqrt(0.75)])
-        for k in range(4):
-            start = np.array(
-                [0.2 + 1.04 * k + (0 if sign > 0 else -0.9), -0.2 if sign > 0 else 3.0]
-            )
-            laths.append(np.array([start, start + 3.6 * along]))
-    return design(laths, 0.5) | {"free_ends": True}
-
-
-def test_a_dangling_lath_is_named():
-    laths = [np.array([[-0.2, k], [3.2, k]]) for k in range(4)]
-    laths += [np.array([[k, -0.2], [k, 3.2]]) for k in range(4)]
-    laths.append(np.array([[2.5, 2.5], [2.6, 3.4]]))
-    data = design(laths, 0.3) | {"free_ends": True}
-    with pytest.raises(
-        InputError, match=r"curves\[8\]: turns about .* without the rest of the net"
-    ):
-        design_from_dict(copy.deepcopy(data))
+def test_designs_assembled_in_place_have_no_way(repository):
+    grid = load_design(repository / "models" / "grids" / "02_saddle.json")
+    assert grid.way is None
