@@ -195,12 +195,14 @@ class DesignObjective:
         return self.judge(q, equilibria)
 
     def redeploy(self, q: np.ndarray) -> Evaluation:
-        """F at q, every role solved from the design's own starting geometry. May raise
+        """F at q, every role solved from the design's own starting geometry, with the states on its
+        way from the assembly where designs have to open by themselves. May raise
         SimulationFailure."""
         try:
-            return self.judge(q, self.design.deploy(q))
+            found = self.judge(q, self.design.deploy(q))
         except SimulationFailure as failure:
             raise failure.within(self.design.name) from None
+        return found if self._way is None else self.opened(found)
 
     def opened(self, evaluation: Evaluation) -> Evaluation:
         """F of the state that the design opens into by itself at the evaluation's parameters, with

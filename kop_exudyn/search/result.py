@@ -32,8 +32,9 @@ class KitResult:
     designs, references : what was asked for
     stages : by name ("direct", "unrelaxed", "relaxed", "assigned")
     events : accepted steps of all SQPs, in order
-    redeployed : by design, the state that the assigned parts open into by themselves; empty where
-        it wasn't computed
+    redeployed : by design, the state that the assigned parts open into by themselves, with those
+        on the way there (`Evaluation.way`) and the stress in all of them
+        (`Evaluation.utilisation`); empty where it wasn't computed
     clustering : by kind, how far the parts that the search began with are from the best clustering
         of the input elements
     equilibria, newton_iterations : solved in all

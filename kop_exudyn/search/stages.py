@@ -236,13 +236,15 @@ class Stages:
         return self.confirmed(self.opened(result))
 
     def redeployed(self, result: StageResult) -> list[Evaluation | SimulationFailure]:
-        """Every design built of the result's parts and deployed from its own starting geometry."""
+        """Every design built of the result's parts and deployed from its own starting geometry,
+        with the states on its way there where designs have to open by themselves."""
         places = [
             d.q if isinstance(d, Evaluation) else design.parameters
             for d, design in zip(result.designs, self.dataset.designs)
         ]
         q = self._realised(result.kit, result.assignment, np.concatenate(places)[self.dataset.free])
-        found = self.dataset.redeploy(q, range(len(result.designs)))
+        secured = self.dataset.requiring(self.required)
+        found = secured.redeploy(q, range(len(result.designs)))
         return [found[n] for n in range(len(result.designs))]
 
     def to_parts(self, relaxed: StageResult) -> tuple[StageResult, StageResult]:
