@@ -14,7 +14,7 @@ from pathlib import Path
 from kop_exudyn.drawing.style import with_palette
 from kop_exudyn.files.files import write_bytes
 from kop_exudyn.io.datasets import load_designs, select_files
-from kop_exudyn.report.environment import usable_cores
+from kop_exudyn.provenance import usable_cores
 from kop_exudyn.report.kit_run import optimize_and_report
 from kop_exudyn.search.settings import JobSettings, StageSettings
 

@@ -8,6 +8,7 @@ from pathlib import Path
 FOLDERS = (
     "errors",
     "plugins",
+    "provenance",
     "units",
     "compiled",
     "geometry",

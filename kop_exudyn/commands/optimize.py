@@ -124,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
     from ..io.studies import load_study
     from ..kit.parts import Kit
     from ..kit.stock import Stock
-    from ..report.environment import usable_cores
+    from ..provenance import usable_cores
     from ..report.kit_run import optimize_and_report
     from ..search.objective import Weights
 

@@ -17,9 +17,11 @@ from ..files.arrays import load_arrays, save_arrays
 from ..files.documents import check_envelope
 from ..files.files import is_temporary, make_folder, read_bytes
 from ..files.json_files import plain, read_json, write_json
+from ..provenance import code_digest
 
 CHECKPOINT_VERSION = 1
 _JOB_FILE = "job.json"
+_CODE = "code"
 _NAME = re.compile(r"[A-Za-z0-9_.+-]+")
 
 
@@ -39,13 +41,19 @@ class Job:
         """The job of these settings (numbers, texts, lists, mappings) and input files, told apart
         by their names."""
         return cls(
-            {"kop_exudyn": __version__, **plain(settings)},
+            {"kop_exudyn": __version__, _CODE: code_digest(), **plain(settings)},
             {Path(path).name: hashlib.sha256(read_bytes(path)).hexdigest() for path in files},
         )
 
-    def difference(self, other: Job) -> str | None:
-        """The first thing in which the jobs differ, in words; None when they are the same."""
+    def difference(self, other: Job, *, code: bool = True) -> str | None:
+        """The first thing in which the jobs differ, in words; None when they are the same.
+
+        other : the later one
+        code : whether jobs that were run by different sources of this package differ
+        """
         mine, theirs = _flat(self.settings), _flat(other.settings)
+        if mine.pop(_CODE, None) != theirs.pop(_CODE, None) and code:
+            return "kop_exudyn itself has changed since"
         for name in [*mine, *theirs]:
             if mine.get(name) != theirs.get(name):
                 return f"{name} was {_shown(mine, name)} and is now {_shown(theirs, name)}"

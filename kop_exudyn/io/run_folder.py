@@ -64,7 +64,7 @@ def _check_free(path: Path, record: Path, job: Job) -> None:
             "overwriting",
             source=path,
         )
-    difference = Job.load(record).difference(job)
+    difference = Job.load(record).difference(job, code=False)  # results may be renewed
     if difference is not None:
         raise InputError(
             f"the folder holds the results of a different job ({difference}): choose another or "

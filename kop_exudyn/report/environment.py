@@ -3,14 +3,15 @@ host."""
 
 from __future__ import annotations
 
-import os
 import platform
+from datetime import date
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from .. import __version__
 from ..compiled.build import instruction_set
 from ..compiled.library import library
+from ..provenance import code_digest, commit, memory_gb, processor, usable_cores
 from ..search import memory
 
 # the packages whose versions can change numbers
@@ -18,24 +19,21 @@ _PACKAGES = ("exudyn", "numpy", "scipy", "qdldl", "osqp", "piqp", "libigl")
 
 
 def environment() -> dict[str, Any]:
-    """Versions of this package, Python and the numerical libraries; system, processor type, usable
-    cores."""
+    """Versions of this package, Python and the numerical libraries; digest of the code, commit and
+    date; system, processor, usable cores and memory."""
     return {
         "kop_exudyn": __version__,
         "python": platform.python_version(),
         **{name: found for name in _PACKAGES if (found := _version(name)) is not None},
         "kernels": "NumPy" if library() is None else f"compiled, {instruction_set() or 'plain'}",
+        "code": code_digest(),
+        "commit": commit(),
+        "date": date.today().isoformat(),
         "system": platform.system(),
-        "processor": platform.machine(),
+        "processor": processor(),
         "cores": usable_cores(),
+        "memory, GB": memory_gb(),
     }
-
-
-def usable_cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _version(package: str) -> str | None:

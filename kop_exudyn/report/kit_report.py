@@ -33,7 +33,8 @@ def write_kit_report(result: KitResult, folder: str | Path) -> Path:
     Returns the page's path. Raises InputError when a file can't be written.
     """
     folder = make_folder(folder)
-    save_result(folder / "result.json", result.to_dict(), overwrite=True)
+    content = result.to_dict() | {"environment": environment()}
+    save_result(folder / "result.json", content, overwrite=True)
     save_kit(folder / "kit.json", result.kit, overwrite=True)
     save_states(folder / "states.npz", final_states(result), overwrite=True)
     figures = {

@@ -30,7 +30,8 @@ from kop_exudyn.drawing.style import figure_bytes, save_figure, with_palette
 from kop_exudyn.files.files import make_folder, write_bytes
 from kop_exudyn.files.json_files import read_json, write_json
 from kop_exudyn.files.tables import write_csv
-from kop_exudyn.report.environment import environment, usable_cores
+from kop_exudyn.provenance import usable_cores
+from kop_exudyn.report.environment import environment
 from kop_exudyn.report.page import Page
 
 from .sweep import Task, TaskResult, run_sweep

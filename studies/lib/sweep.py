@@ -21,6 +21,7 @@ from typing import Any, Protocol
 
 from kop_exudyn import __version__
 from kop_exudyn.errors import InputError, SimulationFailure
+from kop_exudyn.provenance import code_digest
 
 log = logging.getLogger(__name__)
 
@@ -55,6 +56,7 @@ class Task:
         function = inspect.unwrap(self.function)
         return {
             "kop_exudyn": __version__,
+            "code": code_digest(),
             "function": function.__qualname__,
             "settings": _plain(self.settings),
         }

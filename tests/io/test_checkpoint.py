@@ -6,6 +6,7 @@ import shutil
 import numpy as np
 import pytest
 
+from kop_exudyn import provenance
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.checkpoint import CheckpointStore, Job
 from kop_exudyn.io.run_folder import RunFolder
@@ -132,3 +133,23 @@ class TestRunFolder:
         assert "nothing to resume" in caplog.text
         folder.store.save("one", ARRAYS)
         assert RunFolder.open(tmp_path / "out", job(inputs), resume=True).store.names() == ["one"]
+
+
+def test_other_code_does_not_go_on_but_may_begin_anew(tmp_path, monkeypatch):
+    """Results of different code are not mixed; the same command still renews them."""
+    folder = RunFolder.open(tmp_path / "run", Job.of({"parts": 3}, []))
+    folder.store.save("relaxed", {"x": np.zeros(2)})
+    monkeypatch.setattr("kop_exudyn.io.checkpoint.code_digest", lambda: "another")
+    with pytest.raises(InputError, match="can't resume.*kop_exudyn itself has changed"):
+        RunFolder.open(tmp_path / "run", Job.of({"parts": 3}, []), resume=True)
+    assert RunFolder.open(tmp_path / "run", Job.of({"parts": 3}, [])).store.names() == []
+
+
+def test_the_digest_of_the_code_changes_with_any_source(tmp_path, monkeypatch):
+    (tmp_path / "a.py").write_text("x = 1\n")
+    monkeypatch.setattr(provenance, "_PACKAGE", tmp_path)
+    digests = set()
+    for content in ("x = 1\n", "x = 2\n", "x = 1\n"):
+        (tmp_path / "a.py").write_text(content)
+        digests.add(provenance.code_digest.__wrapped__())
+    assert len(digests) == 2
