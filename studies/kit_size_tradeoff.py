@@ -23,9 +23,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from kop_exudyn.analysis.tradeoff import knee, tradeoff_row
+from kop_exudyn.report.tradeoff_drawing import draw_tradeoff
 from lib.study import Study
 from lib.study_tasks import shared_kits
-from lib.tradeoff_drawing import draw_tradeoff
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
 

@@ -6,4 +6,14 @@ underscore. Modules import what they compute with inside `run`, so that ``kop --
 All take --json (see `output`), --quiet and --verbose.
 """
 
-NAMES = ("simulate", "check", "optimize", "import", "view", "export", "examples", "completion")
+NAMES = (
+    "simulate",
+    "check",
+    "optimize",
+    "tradeoff",
+    "import",
+    "view",
+    "export",
+    "examples",
+    "completion",
+)

@@ -5,10 +5,21 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .output import add_json, report
-from .values import design_selection, not_negative, part_counts, positive, term_weights
+from .values import (
+    design_selection,
+    kit_cost,
+    not_negative,
+    part_counts,
+    positive,
+    positive_number,
+    term_weights,
+)
+
+if TYPE_CHECKING:
+    from ..io.studies import Study
 
 HELP = "find one kit of parts for several designs"
 DESCRIPTION = """Finds one kit of parts from which all designs of a folder, or of a study file, can
@@ -25,7 +36,11 @@ EXAMPLES = """examples:
   kop optimize models/conformals --parts linear=12,angular=5 --out out/kit --resume
   kop optimize study.toml --out out/kit --seed 1
   kop optimize models/conformals --designs 06_moebius --kit out/kit/kit.json --out out/another
+  kop optimize models/conformals --designs 5 --max-deviation 1.5 --out out/smallest
   kop optimize models/conformals --designs 3 --stock store.csv --out out/from_stock"""
+
+
+_FIRST_PARTS = 8  # of a kind, where a search for the smallest kit begins
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -59,6 +74,20 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="with --stock: all designs stand at the same time (default: they are built one after "
         "the other from the same pieces)",
+    )
+    parser.add_argument(
+        "--max-deviation",
+        type=positive_number,
+        metavar="PERCENT",
+        help="find the smallest kit that keeps every design within this deviation from its target, "
+        "in %% of its box; the search begins with --parts (default: 8 of each kind)",
+    )
+    parser.add_argument(
+        "--cost",
+        type=kit_cost,
+        metavar="part=W,...",
+        help="with --max-deviation: what is to be small, weights of a part, a piece and a cut "
+        "(default: part=1)",
     )
     parser.add_argument(
         "--weights",
@@ -148,7 +177,19 @@ def run(args: argparse.Namespace) -> int:
         kit = load_kit(args.kit)
     elif args.stock is not None:
         kit = load_stock(args.stock, together=args.together)
-    parts = {_singular(k): count for k, count in (args.parts or study.parts).items()}
+    parts = {singular(k): count for k, count in (args.parts or study.parts).items()}
+    if args.max_deviation is not None:
+        if kit is not None:
+            raise InputError(
+                "looks for a kit of its own: give it without --kit and --stock",
+                field="--max-deviation",
+                value=args.max_deviation,
+            )
+        return _smallest(args, study, parts)
+    if args.cost:
+        raise InputError(
+            "says which kit is the smallest: give it with --max-deviation", field="--cost"
+        )
     if not parts and kit is None:
         raise InputError(
             "says nothing of the parts: --parts, --kit or --stock is required", source=args.folder
@@ -195,6 +236,56 @@ def run(args: argparse.Namespace) -> int:
     return 1 if failed else 0
 
 
+def _smallest(args: argparse.Namespace, study: Study, parts: dict[str, int]) -> int:
+    """The smallest kit within a deviation."""
+    from dataclasses import replace
+
+    from ..analysis.sizes import KitCost
+    from ..report.environment import usable_cores
+    from ..report.sizes_run import smallest_and_report
+    from ..search.objective import Weights
+
+    Weights.of(args.weights or {})
+    study = replace(
+        study,
+        settings=replace(study.settings, **_given(args)),
+        weights={**study.weights, **(args.weights or {})},
+        baselines=False,
+    )
+    designs = study.designs()
+    counts: dict[str, int] = {}
+    for design in designs:
+        for group in design.groups:
+            counts[group.kind] = counts.get(group.kind, 0) + len(group.indices)
+    first = {
+        kind: parts.get(kind, min(_FIRST_PARTS, count)) for kind, count in counts.items() if count
+    }
+    cost = KitCost(**args.cost) if args.cost else KitCost()
+    chosen, kept = smallest_and_report(
+        designs,
+        args.max_deviation,
+        {**first, **parts},
+        out=args.out,
+        cost=cost,
+        settings=study.job_settings(designs, args.jobs or usable_cores()),
+        inputs=study.files,
+        resume=args.resume,
+        overwrite=args.overwrite,
+        progress=not args.quiet,
+    )
+    page = args.out / "index.html"
+    row = chosen.row(cost)
+    report(
+        args,
+        {"page": page, "kit": args.out / "kit.json", "within": kept, **row},
+        f"{page}\n{', '.join(f'{n} {kind}' for kind, n in chosen.sizes.items())} parts, largest "
+        f"deviation {chosen.max_percent:.3g} %\n",
+    )
+    if not kept:
+        sys.stderr.write(f"kop: no kit that was tried keeps within {args.max_deviation:g} %\n")
+    return 0 if kept else 1
+
+
 def _given(args: argparse.Namespace) -> dict[str, Any]:
     """The stages' settings that options give."""
     steps = dict.fromkeys(("relaxed_steps", "assigned_steps", "round_steps"), args.max_steps)
@@ -202,7 +293,7 @@ def _given(args: argparse.Namespace) -> dict[str, Any]:
     return {name: value for name, value in given.items() if value is not None}
 
 
-def _singular(kind: str) -> str:
+def singular(kind: str) -> str:
     """The kind's name; its plural is understood as well."""
     from ..kit.kinds import kind_names, part_kind
 

@@ -17,6 +17,28 @@ def part_counts(text: str) -> dict[str, int]:
     }
 
 
+def part_ranges(text: str) -> dict[str, list[int]]:
+    """``linear=2:12:2,angular=5`` as {"linear": [2, 4, ..., 12], "angular": [5]}."""
+    found = {}
+    for kind, numbers in _assignments(text, "kind", "KIND=A:B,...").items():
+        ends = [_whole(n, 1, f"the number of {kind} parts") for n in numbers.split(":")]
+        if len(ends) > 3 or len(ends) > 1 and ends[0] > ends[1]:
+            raise argparse.ArgumentTypeError(f"expected A:B or A:B:STEP, got {numbers!r}")
+        found[kind] = ends if len(ends) == 1 else list(range(ends[0], ends[1] + 1, *ends[2:]))
+    return found
+
+
+def kit_cost(text: str) -> dict[str, float]:
+    """``part=1,piece=0.02`` as {"part": 1.0, "piece": 0.02}."""
+    found = term_weights(text)
+    for name, value in found.items():
+        if name not in ("part", "piece", "cut") or value < 0:
+            raise argparse.ArgumentTypeError(
+                f"expected part=W,piece=W,cut=W, not negative, got '{name}={value:g}'"
+            )
+    return found
+
+
 def term_weights(text: str) -> dict[str, float]:
     """``fit=1e4,energy=0.05`` as {"fit": 1e4, "energy": 0.05}; whether there are such terms is
     checked later."""

@@ -3,6 +3,7 @@ shows them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +24,15 @@ from .viewer import save_viewer
 from .viewer_scenes import kit_scene
 
 
-def write_kit_report(result: KitResult, folder: str | Path) -> Path:
+def write_kit_report(
+    result: KitResult, folder: str | Path, extend: Callable[[Page], object] = lambda page: None
+) -> Path:
     """Write result.json, kit.json, states.npz, figures, viewer.html and index.html; files of those
     names are replaced.
 
     result : of a search
     folder : made where it isn't there yet
+    extend : adds sections of its own to the page, after those about the kit
 
     Returns the page's path. Raises InputError when a file can't be written.
     """
@@ -45,10 +49,10 @@ def write_kit_report(result: KitResult, folder: str | Path) -> Path:
     for name, figure in figures.items():
         save_figure(figure, folder / name, overwrite=True)
     save_viewer(folder / "viewer.html", kit_scene(result), overwrite=True)
-    return _page(result, figures).save(folder / "index.html", overwrite=True)
+    return _page(result, figures, extend).save(folder / "index.html", overwrite=True)
 
 
-def _page(result: KitResult, figures: dict) -> Page:
+def _page(result: KitResult, figures: dict, extend: Callable[[Page], object]) -> Page:
     sizes = " and ".join(f"{count} {kind}" for kind, count in result.kit.sizes.items())
     elements = sum(design.n_elements for design in result.designs)
     designs = "a design" if len(result.designs) == 1 else f"{len(result.designs)} designs"
@@ -103,6 +107,7 @@ def _page(result: KitResult, figures: dict) -> Page:
             f"The {len(parts)} {kind} parts, {unit}",
             {str(k): part if several else [part] for k, part in enumerate(parts, 1)},
         )
+    extend(page)
     page.section(
         "How it was made",
         f"{result.equilibria:,} equilibria and {result.newton_iterations:,} Newton "

@@ -59,7 +59,7 @@ def optimize_and_report(
     if not inputs:
         job |= {"parameters": {design.name: digest(design.parameters) for design in designs}}
     folder = RunFolder.open(out, Job.of(job, inputs), resume=resume, overwrite=overwrite)
-    with _progress_bar(progress) as bar:
+    with progress_bar(progress) as bar:
 
         def observe(event: StageEvent) -> None:
             bar.set_postfix_str(f"{event.sqp}: J = {event.record.value:.4g}", refresh=False)
@@ -79,7 +79,7 @@ def optimize_and_report(
 
 
 @contextmanager
-def _progress_bar(shown: bool) -> Iterator[tqdm]:
+def progress_bar(shown: bool) -> Iterator[tqdm]:
     """A bar of accepted steps on standard error; log messages appear above it."""
     look = "{desc}: {n_fmt} steps, {elapsed}{postfix}"
     with (

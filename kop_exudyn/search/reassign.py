@@ -112,9 +112,21 @@ def reassign(
 
     Where the problem has a stock, no more pieces are used than there are: elements take what is
     left, and exchange what they have. Elements of kinds that realise intervals keep their parts
-    too. Returns None where no element
-    gains by another part, or the constraints can't be met with what it would get.
+    too. Returns None where no element gains by another part, or the constraints can't be met with
+    what it would get.
     """
+    found = improved(problem, model, frozen, move_parts)
+    return found if found is not None and found.changes else None
+
+
+def improved(
+    problem: AssignedProblem,
+    model: LocalModel,
+    frozen: Sequence[int] = (),
+    move_parts: MoveParts | None = None,
+) -> Reassignment | None:
+    """As `reassign`, but also where no element gets another part; None where the constraints can't
+    be met."""
     move_parts = move_parts or best_parts
     before, vector = problem.assignment, problem.variables(np.concatenate(model.base))
     start = value = model.values(problem.dataset.split(problem.matrix @ vector)).sum()
@@ -131,8 +143,6 @@ def reassign(
         if last - value <= max(_SETTLED * (start - value), model.rounding):
             break
     changes = current.assignment.changes(before)
-    if not changes:
-        return None
     predicted = model.values(problem.dataset.split(current.matrix @ vector))
     return Reassignment(
         problem.kit_of(vector), current.assignment, problem.free_of(vector), predicted, changes

@@ -20,12 +20,13 @@ from ..structures.base import Design
 from ..units import common_units
 from .assigned import assigned_stage, opened_stage
 from .dataset import Dataset
+from .neighbours import resized
 from .objective import Weights
 from .pool import DesignPool
 from .requirements import Requirements
 from .result import KitResult
 from .settings import JobSettings
-from .stage_results import StageEvent
+from .stage_results import StageEvent, StageResult
 from .stages import Observer, Stages, Store
 
 
@@ -34,7 +35,7 @@ def optimize_kit(
     parts: Mapping[str, int] | None = None,
     *,
     kit: Kit | Stock | None = None,
-    start: Sequence[Sequence[float]] | None = None,
+    start: Sequence[Sequence[float]] | StageResult | None = None,
     settings: JobSettings = JobSettings(),
     store: Store | None = None,
     observer: Observer | None = None,
@@ -50,7 +51,8 @@ def optimize_kit(
         more pieces are used than there are
     start : by design, elements (nq,) that a neighbouring kit realises, in place of the direct
         projection, the baseline and the relaxed stage: the elements are clustered anew, and the
-        assigned stage begins there
+        assigned stage begins there. Or the assigned stage of a neighbouring kit itself, whose parts
+        are split and merged until there are as many as asked for
     settings : weights, stages, processes
     store : keeps checkpoints, from which an interrupted run goes on
     observer : sees every accepted step
@@ -83,7 +85,10 @@ def optimize_kit(
         stages = Stages(dataset, sought, settings.stages, store, observe)
         result = KitResult(list(designs), pool.references, events=events)
         found = result.stages
-        if start is not None:
+        if isinstance(start, StageResult):
+            announce("splitting and merging parts")
+            found["built"] = stages.confirmed(resized(stages, start, dict(parts or {})))
+        elif start is not None:
             announce("path from the neighbouring kit")
             found["built"] = stages.from_neighbour(np.concatenate(list(start)))
         else:

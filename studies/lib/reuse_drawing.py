@@ -12,8 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from kop_exudyn.drawing.style import INK, PALETTE, QUIET, style
-
-from .tradeoff_drawing import whole_numbers
+from kop_exudyn.report.tradeoff_drawing import whole_numbers
 
 _MAP = "Blues"  # ordered by brightness, for all kinds of sight
 

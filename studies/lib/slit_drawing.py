@@ -14,8 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from kop_exudyn.drawing.style import FAINT, INK, PALETTE, style
-
-from .tradeoff_drawing import whole_numbers
+from kop_exudyn.report.tradeoff_drawing import whole_numbers
 
 _FORMS = ("o", "s", "^", "D", "v", "P", "X")
 

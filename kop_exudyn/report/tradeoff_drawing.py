@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator, NullFormatter
 
-from kop_exudyn.analysis.tradeoff import envelope
-from kop_exudyn.drawing.style import FAINT, PALETTE, QUIET, style
+from ..analysis.tradeoff import envelope
+from ..drawing.style import FAINT, PALETTE, QUIET, style
 
 Rows = Sequence[Mapping[str, Any]]
 

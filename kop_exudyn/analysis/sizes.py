@@ -1,0 +1,288 @@
+"""How many parts are enough: kits of neighbouring sizes, and the smallest one within a deviation.
+
+Every kit but the first starts from one of another size, whose parts are split or merged
+(search/neighbours.py). A larger kit is never worse than the smaller one it is compared with: where
+its own search ends with a larger deviation, the smaller kit with parts of it doubled is kept.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..kit.kinds import part_kind
+from ..search.result import KitResult
+from ..search.run import optimize_kit
+from ..search.settings import JobSettings
+from ..search.stage_results import StageResult
+from ..search.stages import NoStore, Store
+from ..structures.base import Design
+from .reuse import counts_of, fabricated, kit_size_percent
+
+log = logging.getLogger(__name__)
+
+_SHARE = 0.25  # of a kind's parts, by which kits grow, and shrink at first
+_MOST = 60  # parts of a kind; designs that need more share nothing worth the name
+_PREFIX = "{}-{}-"
+
+
+@dataclass(frozen=True)
+class KitCost:
+    """What a kit costs, in any unit.
+
+    part : each part, whatever the number of its pieces (a template, a setting of the saw)
+    piece : each fabricated piece, for designs that are built one after the other
+    cut : each cut across a bar; a piece of a kind with lengths has two
+    """
+
+    part: float = 1.0
+    piece: float = 0.0
+    cut: float = 0.0
+
+    def of(self, result: KitResult) -> float:
+        """The cost of a result's kit."""
+        counts = _fabricated(result)
+        cuts = 2 * sum(n for kind, n in counts.items() if not part_kind(kind).angular)
+        parts = sum(result.kit.sizes.values())
+        return self.part * parts + self.piece * sum(counts.values()) + self.cut * cuts
+
+
+@dataclass(frozen=True)
+class SizedKit:
+    """One kit of a trade-off.
+
+    result : of its search
+    sizes : kind -> number of parts asked for; the kit may have fewer, see `origin`
+    origin : what it started from, in words
+    seconds : wall time of its search
+    """
+
+    result: KitResult
+    sizes: Mapping[str, int]
+    origin: str
+    seconds: float
+
+    @property
+    def max_percent(self) -> float:
+        """The largest deviation of any design as it opens, % of its box; infinite where one can't
+        be built."""
+        return deviation(self.result)
+
+    def row(self, cost: KitCost = KitCost()) -> dict[str, Any]:
+        """Figures for tables: deviations in % of the boxes' diagonals, None where a design
+        failed."""
+        result = self.result
+        pieces = counts_of(_plain(result.pieces()))
+        designs = [result.summary("assigned", n) for n in range(len(result.designs))]
+        built = [design for design in designs if "failed" not in design]
+        whole = len(built) == len(designs)
+        ratios = [design["energy_ratio"] for design in built]
+        return {
+            **dict(self.sizes),
+            "parts": sum(self.sizes.values()),
+            "pieces": fabricated(pieces),
+            "kit size %": kit_size_percent(pieces),
+            "cost": cost.of(result),
+            "max %": self.max_percent if np.isfinite(self.max_percent) else None,
+            "mean %": float(np.mean([d["fit"]["mean_percent"] for d in built])) if whole else None,
+            "energy ratio": float(np.mean(ratios)) if whole else None,
+            "largest energy ratio": max(ratios) if whole else None,
+            "failed designs": len(designs) - len(built),
+            "J": result.stages["assigned"].value,
+            "from": self.origin,
+            "equilibria": result.equilibria,
+            "seconds": self.seconds,
+        }
+
+
+Observer = Callable[[SizedKit], None]
+
+
+def deviation(result: KitResult) -> float:
+    """The largest deviation of any design, as kept and as it opens from its assembly, % of its box;
+    infinite where one can't be built."""
+    found = [result.summary("assigned", n) for n in range(len(result.designs))]
+    if result.redeployed:
+        found += [result.redeployment(n) for n in range(len(result.designs))]
+    if any("failed" in one for one in found):
+        return float("inf")
+    return max(one["fit"]["max_percent"] for one in found)
+
+
+def smallest_kit(
+    designs: Sequence[Design],
+    limit: float,
+    first: Mapping[str, int],
+    *,
+    settings: JobSettings = JobSettings(),
+    cost: KitCost = KitCost(),
+    accepts: Callable[[KitResult], bool] = lambda result: True,
+    store: Store | None = None,
+    observer: Observer = lambda kit: None,
+    announce: Callable[[str], None] = lambda text: None,
+) -> tuple[SizedKit | None, list[SizedKit]]:
+    """The cheapest kit found from which all designs can be built within a deviation.
+
+    limit : largest deviation, % of each design's box
+    first : kind -> number of parts of the kit that the search begins with
+    cost : what is to be small
+    accepts : further conditions on a kit
+    store : keeps checkpoints of every size, from which an interrupted search goes on
+    observer, announce : are told every kit, and what is being done
+
+    From a kit that is good enough, parts of the dearest kind are merged away, a quarter of them at
+    first, then fewer, until no kind can do with one part less. A kit that isn't good enough grows
+    by a quarter of every kind until it is.
+
+    Returns the kit, None where none was found up to 60 parts of a kind, and all kits in the order
+    in which they were looked at.
+    """
+    if not limit > 0:
+        raise InputError("expected a positive deviation in %", field="max_deviation", value=limit)
+    chain = _Chain(designs, settings, store, observer, announce)
+
+    def good(kit: SizedKit) -> bool:
+        return kit.max_percent <= limit and accepts(kit.result)
+
+    now = chain.kit(dict(first))
+    most = {kind: min(_MOST, count) for kind, count in _elements(designs).items()}
+    while not good(now):
+        sizes = {k: min(most[k], n + max(1, round(_SHARE * n))) for k, n in now.sizes.items()}
+        if sizes == now.sizes:
+            return None, chain.kits
+        now = chain.kit(sizes, now)
+    blocked: dict[str, int] = {}  # kind -> the step that failed last
+    while True:
+        steps = {
+            kind: min(max(1, round(_SHARE * n)), blocked.get(kind, n) // 2 or 1, n - 1)
+            for kind, n in now.sizes.items()
+            if n > 1 and blocked.get(kind) != 1
+        }
+        if not steps:
+            return now, chain.kits
+        kind = max(steps, key=lambda k: (steps[k], now.sizes[k]))
+        trial = chain.kit({**now.sizes, kind: now.sizes[kind] - steps[kind]}, now)
+        if good(trial) and cost.of(trial.result) <= cost.of(now.result):
+            now = trial
+        else:
+            blocked[kind] = steps[kind]
+
+
+def trade_off(
+    designs: Sequence[Design],
+    sizes: Iterable[Mapping[str, int]],
+    *,
+    settings: JobSettings = JobSettings(),
+    store: Store | None = None,
+    observer: Observer = lambda kit: None,
+    announce: Callable[[str], None] = lambda text: None,
+) -> list[SizedKit]:
+    """Kits of these sizes, the smallest first; no kit deviates more than a smaller one before it.
+
+    sizes : kind -> number of parts, from small to large; the largest is searched from scratch, the
+        others from the next larger one, and again from the next smaller one where they are worse
+    store, observer, announce : see `smallest_kit`
+    """
+    wanted = [dict(size) for size in sizes]
+    chain = _Chain(designs, settings, store, observer, announce)
+    kits: list[SizedKit] = []
+    for size in reversed(wanted):
+        kits.insert(0, chain.kit(size, kits[0] if kits else None))
+    for n in range(1, len(kits)):
+        smaller, larger = kits[n - 1], kits[n]
+        if larger.max_percent <= smaller.max_percent or not _all_larger(larger, smaller):
+            continue
+        again = chain.kit(larger.sizes, smaller)
+        best = min((larger, again), key=lambda kit: kit.max_percent)
+        if best.max_percent > smaller.max_percent:
+            best = SizedKit(smaller.result, larger.sizes, "that of fewer parts", again.seconds)
+        kits[n] = best
+    return kits
+
+
+class _Chain:
+    """Searches one after the other, each with its own checkpoints."""
+
+    def __init__(
+        self,
+        designs: Sequence[Design],
+        settings: JobSettings,
+        store: Store | None,
+        observer: Observer,
+        announce: Callable[[str], None],
+    ):
+        self.designs, self.settings = designs, settings
+        self.store, self.observer, self.announce = store or NoStore(), observer, announce
+        self.kits: list[SizedKit] = []
+
+    def kit(self, sizes: Mapping[str, int], start: SizedKit | None = None) -> SizedKit:
+        """A kit of these sizes, from another one or from scratch."""
+        shown = ", ".join(f"{count} {kind}" for kind, count in sizes.items())
+        self.announce(shown)
+        begin = perf_counter()
+        before: StageResult | None = None
+        if start is not None and np.isfinite(start.max_percent):
+            before = start.result.stages["assigned"]
+        own = _Named(self.store, _PREFIX.format(len(self.kits), "-".join(map(str, sizes.values()))))
+        result = optimize_kit(
+            self.designs,
+            sizes,
+            start=before,
+            settings=self.settings,
+            store=own,
+            announce=lambda phase: self.announce(f"{shown}: {phase}"),
+        )
+        origin = "scratch"
+        if before is not None and start is not None:
+            # what the whole chain began with: it is what this kit is compared with
+            earlier = {s: start.result.stages[s] for s in ("direct", "relaxed")}
+            result.stages = {**earlier, **result.stages}
+            result.clustering = start.result.clustering
+            origin = ", ".join(f"{count} {kind}" for kind, count in start.sizes.items())
+        found = SizedKit(result, dict(sizes), origin, perf_counter() - begin)
+        log.info("%s parts: largest deviation %.3g %%", shown, found.max_percent)
+        self.kits.append(found)
+        self.observer(found)
+        return found
+
+
+class _Named:
+    """A store that puts a prefix before the names of its checkpoints."""
+
+    def __init__(self, store: Store, prefix: str):
+        self.store, self.prefix = store, prefix
+
+    def load(self, name: str) -> Mapping[str, np.ndarray] | None:
+        return self.store.load(self.prefix + name)
+
+    def save(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
+        self.store.save(self.prefix + name, arrays)
+
+
+def _fabricated(result: KitResult) -> dict[str, int]:
+    """Kind -> pieces to make so that each of the designs can be built at a time."""
+    pieces = _plain(result.pieces())
+    return {kind: fabricated(counts_of(pieces, kind)) for kind in result.kit.parts}
+
+
+def _plain(pieces: Sequence[Mapping[str, np.ndarray]]) -> list[dict[str, list[int]]]:
+    return [{kind: counts.tolist() for kind, counts in own.items()} for own in pieces]
+
+
+def _elements(designs: Sequence[Design]) -> dict[str, int]:
+    """Kind -> elements of all designs."""
+    found: dict[str, int] = {}
+    for design in designs:
+        for group in design.groups:
+            found[group.kind] = found.get(group.kind, 0) + len(group.indices)
+    return found
+
+
+def _all_larger(one: SizedKit, other: SizedKit) -> bool:
+    return all(one.sizes[kind] >= count for kind, count in other.sizes.items())

@@ -1,0 +1,103 @@
+"""``kop tradeoff``: kits of several sizes for the same designs."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from .output import add_json, report
+from .values import design_selection, kit_cost, not_negative, part_ranges, positive
+
+HELP = "find kits of several sizes, and show what each part more is worth"
+DESCRIPTION = """Finds a kit for each of several sizes: the largest from scratch, every other one by
+merging parts of the next larger one, and again by splitting those of the next smaller one where
+that is better. No kit deviates more than a smaller one. DIR gets tradeoff.csv, tradeoff.json, a
+figure, index.html, and a folder with the report of every kit. --resume goes on where a run was
+stopped."""
+EXAMPLES = """examples:
+  kop tradeoff models/conformals --designs 5 --parts linear=2:12,angular=5 --out out/sizes
+  kop tradeoff models/umbrellas --parts cells=1:12 --out out/umbrella_sizes --resume
+  kop tradeoff models/grids --parts linear=2:12:2,angular=2:7 --out out/grid_sizes"""
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "folder", type=Path, metavar="FOLDER|STUDY", help="folder of designs, or a study (.toml)"
+    )
+    parser.add_argument(
+        "--parts",
+        type=part_ranges,
+        required=True,
+        metavar="KIND=A:B,...",
+        help="from how many to how many parts of each kind, as linear=2:12,angular=5; A:B:STEP "
+        "leaves some out. Kinds with as many numbers grow together",
+    )
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="folder for the results"
+    )
+    parser.add_argument(
+        "--designs",
+        type=design_selection,
+        metavar="N|NAMES",
+        help="the first N designs, or names of files without .json (default: all)",
+    )
+    parser.add_argument(
+        "--cost",
+        type=kit_cost,
+        metavar="part=W,...",
+        help="of a part, a piece, a cut; shown with every kit (default: part=1)",
+    )
+    parser.add_argument("--resume", action="store_true", help="go on from the checkpoints in DIR")
+    parser.add_argument(
+        "--overwrite", action="store_true", help="write to DIR even if it holds something else"
+    )
+    parser.add_argument(
+        "--jobs",
+        type=positive,
+        metavar="N",
+        help="processes that solve designs (default: one a core); the result doesn't depend on it",
+    )
+    parser.add_argument("--seed", type=not_negative, metavar="N", help="of the clustering")
+    add_json(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    from dataclasses import replace
+
+    from ..analysis.sizes import KitCost
+    from ..errors import InputError
+    from ..io.studies import load_study
+    from ..report.environment import usable_cores
+    from ..report.sizes_run import tradeoff_and_report
+    from .optimize import singular
+
+    study = load_study(args.folder, args.designs)
+    ranges = {singular(kind): counts for kind, counts in args.parts.items()}
+    lengths = {len(counts) for counts in ranges.values()} - {1}
+    if len(lengths) > 1:
+        raise InputError(
+            "kinds that change need as many numbers", field="--parts", value=sorted(lengths)
+        )
+    steps = lengths.pop() if lengths else 1
+    sizes = [
+        {kind: counts[min(k, len(counts) - 1)] for kind, counts in ranges.items()}
+        for k in range(steps)
+    ]
+    stages = study.settings if args.seed is None else replace(study.settings, seed=args.seed)
+    study = replace(study, settings=stages, baselines=False)
+    designs = study.designs()
+    cost = KitCost(**args.cost) if args.cost else KitCost()
+    kits = tradeoff_and_report(
+        designs,
+        sizes,
+        out=args.out,
+        cost=cost,
+        settings=study.job_settings(designs, args.jobs or usable_cores()),
+        inputs=study.files,
+        resume=args.resume,
+        overwrite=args.overwrite,
+        progress=not args.quiet,
+    )
+    page = args.out / "index.html"
+    report(args, {"page": page, "kits": [kit.row(cost) for kit in kits]}, f"{page}\n")
+    return 0

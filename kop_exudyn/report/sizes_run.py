@@ -1,0 +1,222 @@
+"""Searches over kit sizes with all that a user sees of them: progress, checkpoints, a table, a
+figure and the chosen kit in one folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from ..analysis.sizes import KitCost, SizedKit, smallest_kit, trade_off
+from ..analysis.tradeoff import knee
+from ..drawing.style import save_figure
+from ..files.json_files import plain, write_json
+from ..files.tables import write_csv
+from ..io.checkpoint import Job
+from ..io.run_folder import RunFolder
+from ..search.result import KitResult
+from ..search.run import check_request, described_job, digest
+from ..search.settings import JobSettings
+from ..structures.base import Design
+from .environment import environment
+from .kit_report import write_kit_report
+from .kit_run import progress_bar
+from .page import Page
+from .tradeoff_drawing import draw_tradeoff
+
+_EXPLAINED = (
+    "Deviations of the designs as they open, in % of their boxes' diagonals: the largest of all "
+    "designs, and the mean over the designs of their means. Pieces: as many of each part as the "
+    "design that needs most of it. J: the objective. From: the kit whose parts were split or "
+    "merged. A dash: a design could not be built."
+)
+_COLUMNS = ("parts", "pieces", "kit size %", "cost", "max %", "mean %", "energy ratio", "J", "from")
+
+
+def smallest_and_report(
+    designs: Sequence[Design],
+    limit: float,
+    first: Mapping[str, int],
+    *,
+    out: str | Path,
+    cost: KitCost = KitCost(),
+    settings: JobSettings = JobSettings(),
+    accepts: Callable[[KitResult], bool] = lambda result: True,
+    inputs: Sequence[str | Path] = (),
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: bool = False,
+) -> tuple[SizedKit, bool]:
+    """Find the smallest kit within a deviation; write its report with all kits looked at.
+
+    Parameters
+    ----------
+    designs, limit, first, cost, settings, accepts : see `smallest_kit`
+    out, inputs, resume, overwrite, progress : see `optimize_and_report`
+
+    Returns the kit and whether it keeps the limit; where none does, the one that deviates least.
+    Raises InputError and SimulationFailure as `optimize_and_report`.
+    """
+    asked = {"max_deviation": limit, "cost": asdict(cost)}
+    with _prepared(
+        designs, first, settings, asked, out, inputs, resume, overwrite, progress
+    ) as run:
+        found, kits = smallest_kit(
+            designs,
+            limit,
+            first,
+            settings=settings,
+            cost=cost,
+            accepts=accepts,
+            store=run.folder.store,
+            observer=run.tell,
+            announce=run.bar.set_description_str,
+        )
+        chosen = found or min(kits, key=lambda kit: kit.max_percent)
+        chosen.result.settings = {**chosen.result.settings, **asked}
+        rows = _rows(kits, cost)
+        figure = _written(run.folder.path, rows)
+
+        def extend(page: Page) -> None:
+            text = (
+                f"The smallest kit found that keeps every design within {limit:g} %."
+                if found is not None
+                else f"No kit that was tried keeps every design within {limit:g} %; this one "
+                f"comes nearest."
+            )
+            page.section("Other sizes", text)
+            _add_table(page, rows, figure)
+
+        write_kit_report(chosen.result, run.folder.path, extend)
+    return chosen, found is not None
+
+
+def tradeoff_and_report(
+    designs: Sequence[Design],
+    sizes: Sequence[Mapping[str, int]],
+    *,
+    out: str | Path,
+    cost: KitCost = KitCost(),
+    settings: JobSettings = JobSettings(),
+    inputs: Sequence[str | Path] = (),
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: bool = False,
+) -> list[SizedKit]:
+    """Find kits of several sizes; write tradeoff.json, tradeoff.csv, a figure and a page, and every
+    kit's own report in a folder of its own.
+
+    Parameters
+    ----------
+    designs, sizes, settings : see `trade_off`
+    cost : shown with every kit
+    out, inputs, resume, overwrite, progress : see `optimize_and_report`
+
+    Raises InputError and SimulationFailure as `optimize_and_report`.
+    """
+    asked = {"sizes": [dict(size) for size in sizes]}
+    with _prepared(
+        designs, sizes[-1], settings, asked, out, inputs, resume, overwrite, progress
+    ) as run:
+        kits = trade_off(
+            designs,
+            sizes,
+            settings=settings,
+            store=run.folder.store,
+            observer=run.tell,
+            announce=run.bar.set_description_str,
+        )
+        rows = [kit.row(cost) for kit in kits]
+        at = knee([row["parts"] for row in rows], [row["max %"] for row in rows])
+        figure = _written(run.folder.path, rows, at)
+        page = Page(
+            "Kit size against fidelity",
+            f"Kits of {rows[0]['parts']} to {rows[-1]['parts']} parts for "
+            f"{', '.join(design.name for design in designs)}.",
+        )
+        _add_table(page, rows, figure)
+        links = {}
+        for kit in kits:
+            name = "-".join(f"{count}_{kind}" for kind, count in kit.sizes.items())
+            write_kit_report(kit.result, run.folder.path / name)
+            links[f"{' and '.join(f'{n} {kind}' for kind, n in kit.sizes.items())} parts"] = (
+                f"{name}/index.html"
+            )
+        page.section("The kits").links(links)
+        page.details("Settings", kits[-1].result.settings)
+        page.details("Versions and machine", environment())
+        page.save(run.folder.path / "index.html", overwrite=True)
+    return kits
+
+
+class _prepared:
+    """A folder for the job, and a bar that tells of kits."""
+
+    def __init__(
+        self,
+        designs: Sequence[Design],
+        parts: Mapping[str, int],
+        settings: JobSettings,
+        asked: Mapping[str, Any],
+        out: str | Path,
+        inputs: Sequence[str | Path],
+        resume: bool,
+        overwrite: bool,
+        progress: bool,
+    ):
+        check_request(designs, parts, None, settings)
+        job = {**described_job(designs, parts, None, settings), **asked}
+        if not inputs:
+            job["parameters"] = {design.name: digest(design.parameters) for design in designs}
+        self.folder = RunFolder.open(
+            out, Job.of(plain(job), inputs), resume=resume, overwrite=overwrite
+        )
+        self._bar = progress_bar(progress)
+
+    def __enter__(self) -> _prepared:
+        self.bar = self._bar.__enter__()
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._bar.__exit__(*error)
+
+    def tell(self, kit: SizedKit) -> None:
+        self.bar.set_postfix_str(
+            f"{' + '.join(map(str, kit.sizes.values()))} parts: {kit.max_percent:.3g} %",
+            refresh=False,
+        )
+        self.bar.update()
+
+
+def _rows(kits: Sequence[SizedKit], cost: KitCost) -> list[dict[str, Any]]:
+    """One row a kit size, small to large; of several kits of one size the better one."""
+    best: dict[tuple[int, ...], SizedKit] = {}
+    for kit in kits:
+        key = tuple(kit.sizes.values())
+        if key not in best or kit.max_percent < best[key].max_percent:
+            best[key] = kit
+    found = [kit.row(cost) for kit in best.values()]
+    return sorted(found, key=lambda row: (row["parts"], -(row["max %"] or float("inf"))))
+
+
+def _written(folder: Path, rows: Sequence[Mapping[str, Any]], at: int | None = None) -> Figure:
+    """Write the table and the figure; gives the figure."""
+    write_json(folder / "tradeoff.json", {"kits": list(rows), "knee": at}, overwrite=True)
+    write_csv(folder / "tradeoff.csv", rows, overwrite=True)
+    figure = draw_tradeoff(rows, "parts", at)
+    save_figure(figure, folder / "tradeoff", overwrite=True)
+    return figure
+
+
+def _add_table(page: Page, rows: Sequence[Mapping[str, Any]], figure: Figure) -> None:
+    kinds = [name for name in rows[0] if name not in _COLUMNS][: list(rows[0]).index("parts")]
+    header = [*kinds, *_COLUMNS]
+    page.figure(
+        figure,
+        "Figures of every kit against its number of parts.",
+        alt="deviation, kit size, energy, time over the number of parts",
+    )
+    page.table(header, [[row[name] for name in header] for row in rows], _EXPLAINED)

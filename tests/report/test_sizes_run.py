@@ -1,0 +1,71 @@
+"""Searches over kit sizes: what they leave in their folder, and going on after an interruption."""
+
+import csv
+import json
+
+import pytest
+from support.zigzags import zigzags
+
+from kop_exudyn.errors import InputError
+from kop_exudyn.io.checkpoint import CheckpointStore
+from kop_exudyn.io.kits import load_kit
+from kop_exudyn.io.results import load_result
+from kop_exudyn.report.sizes_run import smallest_and_report, tradeoff_and_report
+from kop_exudyn.search.settings import JobSettings, StageSettings
+
+STAGES = StageSettings(schedule=(1e3, 1e5), path_steps=4, leaps=0, reassignments=1)
+SETTINGS = JobSettings(jobs=1, stages=STAGES, baselines=False)
+SIZES = [{"linear": n, "angular": 2} for n in (2, 4)]
+
+
+def shown(folder):
+    """The table without what depends on the clock."""
+    rows = json.loads((folder / "tradeoff.json").read_text(encoding="utf-8"))["kits"]
+    return [{k: v for k, v in row.items() if k not in ("seconds", "equilibria")} for row in rows]
+
+
+def test_a_trade_off_and_what_is_left_of_it_when_killed(tmp_path, monkeypatch):
+    kits = tradeoff_and_report(zigzags(), SIZES, out=tmp_path / "whole", settings=SETTINGS)
+    rows = shown(tmp_path / "whole")
+    assert [row["linear"] for row in rows] == [2, 4] and rows[0]["parts"] == 4
+    with open(tmp_path / "whole" / "tradeoff.csv", encoding="utf-8") as file:
+        assert [float(row["max %"]) for row in csv.DictReader(file)] == [
+            kit.max_percent for kit in kits
+        ]
+    page = (tmp_path / "whole" / "index.html").read_text(encoding="utf-8")
+    assert "2_linear-2_angular/index.html" in page
+    for kit, name in zip(kits, ("2_linear-2_angular", "4_linear-2_angular")):
+        assert (
+            load_kit(tmp_path / "whole" / name / "kit.json").to_dict() == kit.result.kit.to_dict()
+        )
+
+    saves = []
+    whole = CheckpointStore.save
+
+    def killed(store, name, arrays):
+        saves.append(name)
+        if len(saves) == 12:
+            raise KeyboardInterrupt
+        whole(store, name, arrays)
+
+    monkeypatch.setattr(CheckpointStore, "save", killed)
+    again = {"out": tmp_path / "again", "settings": SETTINGS}
+    with pytest.raises(KeyboardInterrupt):
+        tradeoff_and_report(zigzags(), SIZES, **again)
+    monkeypatch.undo()
+    tradeoff_and_report(zigzags(), SIZES, **again, resume=True)
+    assert shown(tmp_path / "again") == rows
+    with pytest.raises(InputError, match="different job"):
+        tradeoff_and_report(zigzags(), SIZES[1:], **again, resume=True)
+
+
+def test_the_smallest_kit_and_its_report(tmp_path):
+    chosen, kept = smallest_and_report(
+        zigzags(), 50.0, {"linear": 2, "angular": 1}, out=tmp_path, settings=SETTINGS
+    )
+    assert kept and chosen.sizes == {"linear": 1, "angular": 1}
+    data = load_result(tmp_path / "result.json")
+    assert data["settings"]["max_deviation"] == 50.0 and len(data["kit"]["linear"]) == 1
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert "The smallest kit found that keeps every design within 50 %" in page
+    assert len(shown(tmp_path)) == 2
