@@ -76,7 +76,8 @@ def model_starts(
                     sum(e.value for e in confirmed) + start.predicted.sum(),
                 )
                 found.append(built)
-    return sorted((b for b in found if b.value is not None), key=lambda b: b.value)
+    whole = [built for built in found if built.value is not None]
+    return sorted(whole, key=lambda built: built.value or 0.0)
 
 
 def _best_under(stages: Stages, model: LocalModel, options: StartOptions) -> list[Reassignment]:
