@@ -99,7 +99,7 @@ class SimulationResult:
             **self._limits(),
             "strength": strength_summary(self.design, self.equilibria),
             **({"loaded": self.loaded.to_dict()} if self.loaded is not None else {}),
-            "joints": self.joints.tolist(),
+            "joints": (self.joints + self.design.origin).tolist(),
         }
 
     def _limits(self) -> dict[str, Any]:

@@ -25,19 +25,16 @@ def compas_data(state: DesignState) -> dict[str, Any]:
     from compas.datastructures import Mesh
 
     swept = sweep(state.scene, state.equilibrium.state)
-    mesh = Mesh.from_vertices_and_faces(
-        state.placement.apply(swept.vertices).tolist(), swept.faces.tolist()
-    )
+    mesh = Mesh.from_vertices_and_faces(state.placed(swept.vertices).tolist(), swept.faces.tolist())
     mesh.name = f"{state.design.name} {state.name}"
     rods = swept.chains[swept.faces[:, 0]].tolist()
     known = [state.of_rod(chain) for chain in range(len(state.parts))]
     for face, rod in enumerate(rods):
         mesh.face_attributes(face, ("rod", "part"), (rod, known[rod]["part"]))
     found: dict[str, Any] = {"graph": _graph(state), "mesh": mesh}
-    if state.target is not None:
-        found["target"] = Mesh.from_vertices_and_faces(
-            state.target.vertices.tolist(), state.target.faces.tolist()
-        )
+    if state.surface is not None:
+        vertices, faces = state.surface
+        found["target"] = Mesh.from_vertices_and_faces(vertices.tolist(), faces.tolist())
     units = state.design.units
     return found | {"units": None if units is None else units.to_dict()}
 
@@ -73,7 +70,7 @@ def _graph(state: DesignState) -> Any:
 
     graph = Graph(name=f"{state.design.name} {state.name}")
     joints = {int(body): number for number, body in enumerate(state.design.joints, 1)}
-    places = state.placement.apply(state.equilibrium.state.positions)
+    places = state.placed(state.equilibrium.state.positions)
     ends = np.array([state.scene.node_body[c.nodes[[0, -1]]] for c in state.scene.chains], int)
     for body in np.unique(ends).tolist():
         x, y, z = places[body].tolist()

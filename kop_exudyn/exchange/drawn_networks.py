@@ -22,6 +22,7 @@ from .drawing import Drawing, DrawnCurve, Finding, size_of
 from .frames import Frame, frame_of
 from .joins import join_ends
 
+_FAR = 20.0  # sizes from the origin beyond which a drawing is moved there
 _DIGITS = 9  # of the size, that points are written with
 _SUSPICIOUS = (
     20.0  # times the tolerance: ends that stop so near to another curve may be meant on it
@@ -54,10 +55,12 @@ class DrawnNetwork:
     """What was understood of a drawing.
 
     drawing : as it was read; options : how
-    curves : whole curves, in the drawing's coordinates
+    curves : whole curves, in the drawing's coordinates less its origin
     frame : the plane that they were laid into
     entries : the field `curves` of a design file
     findings : what a reader should know
+    origin (3,) : what was taken off the coordinates of a drawing that lies far from (0, 0, 0); zero
+        for others
     """
 
     drawing: Drawing
@@ -66,6 +69,14 @@ class DrawnNetwork:
     frame: Frame
     entries: list[dict[str, Any]]
     findings: list[Finding] = field(default_factory=list)
+    origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def placed(self) -> dict[str, list[float]]:
+        """The field `origin` of a design file; nothing where it would say nothing."""
+        if not (self.origin.any() and self.frame.standard):
+            return {}
+        return {"origin": (self.options.scale * self.origin).tolist()}
 
     @property
     def labels(self) -> list[str]:
@@ -125,7 +136,12 @@ def drawn_network(
         raise InputError("all points are the same")
     tolerance = options.tolerance * size
     findings = [Finding("skipped", text) for text in drawing.skipped]
-    curves, done = cleaned(drawing.curves, tolerance)
+    # drawings in planes of their own have origins of their own
+    standard = frame_of(drawing.curves, size).standard
+    points = np.concatenate([curve.points for curve in drawing.curves])
+    origin = far_origin(points) if standard else np.zeros(3)
+    near = [replace(curve, points=curve.points - origin) for curve in drawing.curves]
+    curves, done = cleaned(near, tolerance)
     if not curves:
         raise InputError("contains no curves that are longer than the tolerance")
     frame = frame_of(curves, size)
@@ -146,7 +162,16 @@ def drawn_network(
     curves, ends = _ends_on_curves(joined.curves, frame, options, tolerance)
     findings += [*done, *_about_joins(joined), *ends]
     entries = [_entry(curve, frame, options, size) for curve in curves]
-    return DrawnNetwork(drawing, options, curves, frame, entries, findings)
+    return DrawnNetwork(drawing, options, curves, frame, entries, findings, origin)
+
+
+def far_origin(points: np.ndarray) -> np.ndarray:
+    """(3,) what to take off coordinates so that they lie near the origin: whole numbers; zero for
+    points that are not far away already, as sizes go."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = float(np.linalg.norm(high - low))
+    middle = (low + high) / 2
+    return np.round(middle) if np.linalg.norm(middle) > _FAR * size > 0 else np.zeros(3)
 
 
 def _entry(curve: DrawnCurve, frame: Frame, options: ReadingOptions, size: float) -> dict[str, Any]:

@@ -126,7 +126,14 @@ def _write_states(
         done.append(write_rhino(folder / f"{stem}.3dm", states, overwrite=overwrite))
     if "obj" in formats:
         path = folder / f"{stem}_target.obj"
-        done.append(write_mesh_obj(path, target.vertices, target.faces, overwrite=overwrite))
+        done.append(
+            write_mesh_obj(
+                path,
+                target.vertices + states[0].design.origin,
+                target.faces,
+                overwrite=overwrite,
+            )
+        )
     return done
 
 
@@ -138,7 +145,7 @@ def all_labels(parts: PartsList) -> tuple[str, ...]:
 
 def _write_ply(path: Path, state: DesignState, overwrite: bool) -> Path:
     mesh = sweep(state.scene, state.equilibrium.state)
-    placed = mesh.moved(state.placement.apply)
+    placed = mesh.moved(state.placed)
     return write_ply(path, placed, state.colours[mesh.chains], overwrite=overwrite)
 
 

@@ -67,7 +67,7 @@ def glb_bytes(states: Sequence[DesignState], *, target: bool = True) -> bytes:
         prefix = f"{state.design.name} {state.name}"
         scene.graph.update(prefix, "origin", matrix=np.eye(4))
         mesh = sweep(state.scene, state.equilibrium.state)
-        placed = state.placement.apply(mesh.vertices)
+        placed = state.placed(mesh.vertices)
         for part in dict.fromkeys(state.parts):
             scene.graph.update(f"{prefix} {part or 'rods'}", prefix, matrix=np.eye(4))
         for chain, part in enumerate(state.parts):
@@ -81,9 +81,10 @@ def glb_bytes(states: Sequence[DesignState], *, target: bool = True) -> bytes:
                 f"{prefix} {part or 'rods'}",
                 {name: value for name, value in state.of_rod(chain).items() if value is not None},
             )
-        if target and state.target is not None:
-            surface, look = state.target, visual(_TARGET_COLOUR[:3], _TARGET_COLOUR[3])
-            add(f"{prefix} target", surface.vertices, surface.faces, look, prefix, {"target": True})
+        if target and state.surface is not None:
+            vertices, faces = state.surface
+            look = visual(_TARGET_COLOUR[:3], _TARGET_COLOUR[3])
+            add(f"{prefix} target", vertices, faces, look, prefix, {"target": True})
     return scene.export(file_type="glb")
 
 

@@ -15,14 +15,15 @@ _SHOWN = 4  # findings of a kind that are told one by one
 
 
 def import_figures(drawn: DrawnNetwork, units: Units | None) -> dict[str, Any]:
-    """For programs: numbers of curves, pieces and joints, spans, size, units; lengths in the
-    design's unit."""
+    """For programs: numbers of curves, pieces and joints, spans, size, units, and the place of the
+    design's origin where it isn't the drawing's; lengths in the design's unit."""
     found: dict[str, Any] = {
         "pieces": len(drawn.drawing.curves),
         "curves": len(drawn.entries),
         "unit_of_the_drawing": drawn.drawing.unit,
         "scale": drawn.options.scale,
         "units": None if units is None else units.to_dict(),
+        "origin": drawn.placed.get("origin"),
     }
     try:
         return found | dict(network_summary(drawn.network))
@@ -59,6 +60,9 @@ def import_rows(
                     f"{now:.4g}° between the families in the mean, to {then:.4g}° when deployed",
                 )
             )
+    if figures["origin"] is not None:
+        at = ", ".join(f"{x:.15g}" for x in figures["origin"])
+        rows.append(("origin", f"({at}) of the drawing: it lies far from (0, 0, 0)"))
     rows.append(("units", _unit_text(figures, units)))
     names = {"suspicious": "look at"}
     for kind in ("joined", "hinged", "cleaned", "skipped", "suspicious"):

@@ -88,9 +88,11 @@ def import_c_shell(
     findings = drawn.findings + _doubts(drawn, rods)
     goal = None
     if target is not None:
-        goal = mesh_target(relative(target, out), drawn.frame, drawn.options.scale)
+        frame = replace(drawn.frame, origin=drawn.frame.origin + drawn.origin)
+        goal = mesh_target(relative(target, out), frame, drawn.options.scale)
     free = drawn.options.free_ends
     data = c_shell_data(name, drawn.entries, rods, opening, free_ends=free, target=goal)
+    data |= drawn.placed
     _check(drawn, data, out)
     return Imported(data, drawn, findings)
 
@@ -124,18 +126,18 @@ def import_grid(
         assert mesh_file is not None
         drawn = with_heights_checked(drawn)
         vertices, faces, up = surface_through(drawn)
-        meshes[mesh_file] = (vertices, faces)
+        meshes[mesh_file] = (vertices + scale * drawn.origin, faces)
         where: dict[str, Any] = {"type": "mesh", "file": relative(mesh_file, out), "up": up}
         mesh = MeshSurface(vertices, faces, "plane", up)
     else:
         where = {"type": "mesh", "file": relative(surface, out)}
         where |= {"scale": scale} if scale != 1.0 else {}
         where |= {"chart": chart} if chart != "plane" else {}
-        mesh = load_mesh_surface(surface, chart, "z", scale)
+        mesh = load_mesh_surface(surface, chart, "z", scale, scale * drawn.origin)
         if chart == "conformal":
             drawn = replace(drawn, entries=_in_chart(drawn, mesh))
     findings = drawn.findings + _doubts(drawn, rods)
-    data = grid_data(name, drawn.entries, rods, where, held)
+    data = grid_data(name, drawn.entries, rods, where, held) | drawn.placed
     _check(drawn, data, out, mesh if meshes else None)
     return Imported(data, drawn, findings, meshes)
 

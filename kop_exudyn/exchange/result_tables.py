@@ -139,7 +139,7 @@ def _joints(result: KitResult) -> Iterator[dict[str, Any]]:
     for stage, _, design, outcome in _evaluations(result):
         if isinstance(outcome, Evaluation):
             state = outcome.equilibria[design.fitted_role.name].state
-            placed = outcome.fit.placement.apply(state.positions[design.joints])
+            placed = outcome.fit.placement.apply(state.positions[design.joints]) + design.origin
             for number, (x, distance) in enumerate(zip(placed, outcome.fit.distances), 1):
                 yield {
                     "design": design.name,

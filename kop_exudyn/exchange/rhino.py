@@ -67,7 +67,7 @@ def _add_state(rhino3dm: Any, model: Any, state: DesignState) -> None:
         if part not in layers:
             layers[part] = _layer(rhino3dm, model, part or "rods", parent, colour)
     mesh = sweep(state.scene, state.equilibrium.state)
-    vertices = state.placement.apply(mesh.vertices)
+    vertices = state.placed(mesh.vertices)
     for chain, line in enumerate(state.lines):
         attributes = rhino3dm.ObjectAttributes()
         attributes.LayerIndex = layers[state.parts[chain]]
@@ -84,18 +84,16 @@ def _add_state(rhino3dm: Any, model: Any, state: DesignState) -> None:
         solid = _mesh(rhino3dm, vertices[used], faces.reshape(-1, 3))
         model.Objects.AddMesh(solid, attributes)
     joints = _layer(rhino3dm, model, "joints", parent, (0.1, 0.1, 0.1))
-    places = state.placement.apply(state.equilibrium.state.positions[state.design.joints])
+    places = state.placed(state.equilibrium.state.positions[state.design.joints])
     for number, (x, y, z) in enumerate(places.tolist(), 1):
         attributes = rhino3dm.ObjectAttributes()
         attributes.LayerIndex, attributes.Name = joints, f"joint {number}"
         model.Objects.AddPoint(rhino3dm.Point3d(x, y, z), attributes)
-    if state.target is not None:
+    if state.surface is not None:
         attributes = rhino3dm.ObjectAttributes()
         attributes.Name = "target"
         attributes.LayerIndex = _layer(rhino3dm, model, "target", parent, (0.6, 0.65, 0.7))
-        model.Objects.AddMesh(
-            _mesh(rhino3dm, state.target.vertices, state.target.faces), attributes
-        )
+        model.Objects.AddMesh(_mesh(rhino3dm, *state.surface), attributes)
 
 
 def _layer(

@@ -54,8 +54,21 @@ class DesignState:
 
     @cached_property
     def points(self) -> np.ndarray:
-        """(N, 3) nodes of all rods, placed."""
-        return self.placement.apply(self.scene.node_poses(self.equilibrium.state)[0])
+        """(N, 3) nodes of all rods, where files have them."""
+        return self.placed(self.scene.node_poses(self.equilibrium.state)[0])
+
+    def placed(self, points: np.ndarray) -> np.ndarray:
+        """Points (n, 3) of the simulation where files have them: placed, in the user's
+        coordinates."""
+        return self.placement.apply(points) + self.design.origin
+
+    @property
+    def surface(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Vertices (V, 3) and faces (F, 3) of the target where files have them; None without
+        one."""
+        if self.target is None:
+            return None
+        return self.target.vertices + self.design.origin, self.target.faces
 
     @cached_property
     def axes(self) -> np.ndarray:
@@ -73,7 +86,8 @@ class DesignState:
         if self.target is None or self.design.beside_target:
             return np.full(len(self.points), np.nan)
         surface = TriangleSurface(self.target.vertices, self.target.faces)
-        return np.sqrt(surface.closest(self.points).squared_distances)
+        here = self.placement.apply(self.scene.node_poses(self.equilibrium.state)[0])
+        return np.sqrt(surface.closest(here).squared_distances)
 
     @property
     def lines(self) -> list[np.ndarray]:

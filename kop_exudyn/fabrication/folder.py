@@ -119,12 +119,13 @@ def bar_rows(plan: StockPlan | None) -> list[dict[str, object]]:
 
 
 def joint_places(parts: PartsList, name: str) -> np.ndarray:
-    """(n_joints, 3) where a design's joints are in its built state, in its unit of length."""
+    """(n_joints, 3) where a design's joints are in its built state: in its unit of length, in its
+    user's coordinates."""
     number = parts.row_of(name)
     placed = PlacedPieces.of(parts.designs[number])
     role = placed.design.fitted_role.name
     state = parts.states[number][role] if parts.states else placed.scene.initial
-    return state.positions[placed.design.joints]
+    return state.positions[placed.design.joints] + placed.design.origin
 
 
 def _write_sheets(

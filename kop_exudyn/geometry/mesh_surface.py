@@ -136,12 +136,16 @@ class MeshSurface(Surface):
 
 
 def load_mesh_surface(
-    path: Path, chart: str = "plane", up: str = "z", scale: float = 1.0
+    path: Path,
+    chart: str = "plane",
+    up: str = "z",
+    scale: float = 1.0,
+    origin: np.ndarray | float = 0.0,
 ) -> MeshSurface:
-    """The surface of a mesh file, see `read_mesh`, its lengths times the scale. Raises InputError
-    naming the file."""
+    """The surface of a mesh file, see `read_mesh`, its lengths times the scale, less an origin (3,)
+    in scaled lengths. Raises InputError naming the file."""
     vertices, faces = read_mesh(path)
-    return MeshSurface(scale * vertices, faces, chart, up)
+    return MeshSurface(scale * vertices - origin, faces, chart, up)
 
 
 def is_disc(mesh: TriangleSurface) -> bool:

@@ -94,6 +94,9 @@ class Design(ABC):
     loads: LoadCase = LoadCase()
     # Of all its numbers; None where its file names none.
     units: Units | None = None
+    # (3,) where the origin of the design's coordinates lies in those of its user's other files.
+    # Numbers here stay small; what is written for other programs has it added.
+    origin: np.ndarray = np.zeros(3)
     name: str
     parameters: np.ndarray
     lower: np.ndarray
@@ -258,6 +261,8 @@ def design_from_dict(data: Mapping[str, Any], source: str = "design") -> Design:
     design = reader(data, source)
     if "units" in data:
         design.units = units_from_dict(data["units"])
+    if "origin" in data:
+        design.origin = np.array(data["origin"], float)
     if "loads" in data or "supports" in data:
         design.loads = load_case_from_dict(data)
         design.loads.check(len(design.joints), source)

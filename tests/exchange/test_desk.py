@@ -24,7 +24,6 @@ from kop_exudyn.exchange.states import states_of_kit, states_of_simulation
 from kop_exudyn.fabrication.pieces import parts_list_of
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
-from kop_exudyn.structures.fitting import Placement
 from kop_exudyn.structures.loads import LoadCase
 from kop_exudyn.units import Units
 
@@ -105,18 +104,13 @@ def test_glb_is_in_metres_with_y_up_and_knows_every_rod(folder, state):
 def test_glb_of_millimetres_far_away_keeps_its_digits(state):
     """A vault in millimetres, 50 km from the origin: single precision would keep 4 mm."""
     far = np.array([3.0e7, 4.0e7, 100.0])
-    design = type("Named", (), {"name": "far", "units": MM, "joints": state.design.joints,
-                                "beside_target": True})()  # fmt: skip
-    moved = replace(
-        state,
-        design=design,
-        placement=Placement(state.placement.rotation, state.placement.translation + far),
-        target=None,
-    )
+    fields = {"name": "far", "units": MM, "beside_target": True, "joints": state.design.joints}
+    there, here = (type("Named", (), fields | {"origin": at})() for at in (far, np.zeros(3)))
+    moved = replace(state, design=there, target=None)
     scene = trimesh.load(trimesh.util.wrap_as_stream(glb_bytes([moved])), file_type="glb")
     points = np.concatenate([mesh.vertices for mesh in scene.geometry.values()])
     assert np.abs(points).max() < 10.0
-    near = replace(moved, placement=state.placement)
+    near = replace(moved, design=here)
     scene_near = trimesh.load(trimesh.util.wrap_as_stream(glb_bytes([near])), file_type="glb")
     other = np.concatenate([mesh.vertices for mesh in scene_near.geometry.values()])
     np.testing.assert_allclose(np.ptp(points, axis=0), np.ptp(other, axis=0), atol=1e-5)

@@ -5,9 +5,11 @@ import json
 import numpy as np
 import pytest
 
+from kop_exudyn.analysis.simulation import simulate
 from kop_exudyn.cli import main
 from kop_exudyn.exchange.curve_files import read_drawing
 from kop_exudyn.exchange.drawn_networks import ReadingOptions, drawn_network
+from kop_exudyn.exchange.export import export_simulation
 from kop_exudyn.exchange.space_nets import surface_through, with_heights_checked
 from kop_exudyn.io.designs import load_design
 
@@ -232,3 +234,50 @@ class TestPreviews:
     def test_one_of_them_is_needed(self, corpus, capsys):
         status, _, error = imported(capsys, corpus / "lines.obj")
         assert status == 2 and "give --out, --preview or both" in error
+
+
+def test_nets_far_away_are_designs_near_the_origin_and_files_give_the_place_back(tmp_path):
+    """A vault in millimetres, 50 km away: the same design, file for file, as at the origin."""
+
+    far = np.array([30e6, 40e6, 250e3])
+    grid, lines = np.linspace(-6e3, 6e3, 13), np.linspace(-4e3, 4e3, 4)
+    n = len(grid)
+    results = {}
+    for name, at in (("near", np.zeros(3)), ("far", far)):
+        mesh = [(x, y, -5e-5 * x * x - 2e-5 * y * y) + at for y in grid for x in grid]
+        faces = [
+            (a, a + 1, a + n + 1, a + n)
+            for a in (j * n + i for j in range(n - 1) for i in range(n - 1))
+        ]
+        text = ["v {:.4f} {:.4f} {:.4f}".format(*p) for p in mesh]
+        text += ["f " + " ".join(str(k + 1) for k in face) for face in faces]
+        (tmp_path / f"{name}_surface.obj").write_text("\n".join(text))
+        ends = [((-4e3, c), (4e3, c)) for c in lines] + [((c, -4e3), (c, 4e3)) for c in lines]
+        points = [(x + at[0], y + at[1], at[2]) for line in ends for x, y in line]
+        text = ["v {:.4f} {:.4f} {:.4f}".format(*p) for p in points]
+        text += [f"l {2 * k + 1} {2 * k + 2}" for k in range(len(ends))]
+        (tmp_path / f"{name}.obj").write_text("\n".join(text))
+        design = tmp_path / f"{name}.json"
+        command = ["import", str(tmp_path / f"{name}.obj"), "--as", "grid", "--out", str(design)]
+        command += ["--surface", str(tmp_path / f"{name}_surface.obj"), "--unit", "mm"]
+        assert main([*command, "--section", "15,120", "--material", "11000,0.3"]) == 0
+        result = simulate(load_design(design))
+        export_simulation(result, tmp_path / name, formats=["obj", "vtu"])
+        results[name] = result
+    np.testing.assert_array_equal(results["near"].design.origin, 0)
+    np.testing.assert_array_equal(results["far"].design.origin, far.round())
+    joints = {name: np.array(result.to_dict()["joints"]) for name, result in results.items()}
+    np.testing.assert_allclose(joints["far"] - far, joints["near"], atol=1e-3)
+    for file in ("deployed.obj", "target.obj"):
+        near, there = (
+            np.array(
+                [
+                    line.split()[1:]
+                    for line in (tmp_path / name / f"{name}_{file}").read_text().splitlines()
+                    if line.startswith("v ")
+                ],
+                float,
+            )
+            for name in ("near", "far")
+        )
+        np.testing.assert_allclose(there - far, near, atol=1e-3)

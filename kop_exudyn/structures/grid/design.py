@@ -200,7 +200,8 @@ def _triangulated(
 def read_grid(data: Mapping[str, Any], source: str) -> Grid:
     """The grid of a design file's content (see grid.schema.json). Raises InputError."""
     try:
-        return grid_on(_surface(data["surface"], source), data)
+        origin = np.array(data.get("origin", (0.0, 0.0, 0.0)), float)
+        return grid_on(_surface(data["surface"], source, origin), data)
     except InputError as error:
         raise error.at(source) from None
 
@@ -218,10 +219,12 @@ def grid_on(surface: Surface, data: Mapping[str, Any]) -> Grid:
     )
 
 
-def _surface(data: Mapping[str, Any], source: str) -> Surface:
+def _surface(data: Mapping[str, Any], source: str, origin: np.ndarray) -> Surface:
+    """The surface of a design file's field; meshes lie in the coordinates of their files, the
+    design's origin is taken off them."""
     options = {key: value for key, value in data.items() if key not in ("type", "size")}
     if "size" in data:
-        whole = _surface({"type": data["type"], **options}, source)
+        whole = _surface({"type": data["type"], **options}, source, origin)
         return ScaledSurface(whole, float(data["size"]))
     if data["type"] == "analytic":
         return AnalyticSurface(options.pop("name"), options)
@@ -233,6 +236,7 @@ def _surface(data: Mapping[str, Any], source: str) -> Surface:
             options.get("chart", "plane"),
             options.get("up", "z"),
             float(options.get("scale", 1.0)),
+            origin,
         )
     raise InputError(
         "unknown kind of surface (known: analytic, mesh)", field="surface.type", value=data["type"]
