@@ -28,6 +28,7 @@ ANSWER = {
     "elastic_energy": 1.25,
     "stable": True,
     "opening_angle": 0.6,
+    "assembly_angle": 0.1,
     "exudyn": {
         "version": "1.13",
         "newton_steps": 1,
@@ -507,13 +508,22 @@ def test_messages_are_one_line_whatever_the_value(design_file, simulated, capsys
 
 @pytest.mark.parametrize("joints", [1, 100_000])
 def test_a_reader_that_stops_early_is_no_error(joints):
-    code = f"""
-import sys from types import SimpleNamespace from kop_exudyn import cli from kop_exudyn.analysis
-import simulation from kop_exudyn.io import designs designs.load_design = lambda path: None
-simulation.simulate = lambda design: SimpleNamespace(to_dict=lambda: {{"joints": [[0.0] * 3] *
-{joints}}}) sys.exit(cli.main(["simulate", "x", "--json"])) """
+    lines = [
+        "import sys",
+        "from types import SimpleNamespace",
+        "from kop_exudyn import cli",
+        "from kop_exudyn.analysis import simulation",
+        "from kop_exudyn.io import designs",
+        "designs.load_design = lambda path: SimpleNamespace(units=None)",
+        f"answer = {{'joints': [[0.0] * 3] * {joints}}}",
+        "simulation.simulate = lambda design: SimpleNamespace(to_dict=lambda: answer)",
+        "sys.exit(cli.main(['simulate', 'x', '--json']))",
+    ]
     process = subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", "\n".join(lines)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
     process.stdout.close()
     with process.stderr:

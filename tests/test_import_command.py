@@ -11,6 +11,9 @@ def test_a_design_is_no_released_mesh(tmp_path, capsys):
     path = tmp_path / "design.json"
     path.write_text('{"format": "kop_exudyn/design"}')
     assert main(["import", str(path), "--out", str(tmp_path / "out.json")]) == 2
+    assert "is a file of kop_exudyn already" in capsys.readouterr().err
+    path.write_text('{"vertices": [], "faces": []}')
+    assert main(["import", str(path), "--out", str(tmp_path / "out.json")]) == 2
     assert "isn't a released umbrella mesh" in capsys.readouterr().err
     assert not (tmp_path / "out.json").exists()
 

@@ -35,7 +35,7 @@ What was understood is printed, and drawn with --preview; without --out that is 
 EXAMPLES = """examples:
   kop import net.dxf --preview net.html
   kop import net.dxf --out net.json --opening 0.6 --section 0.03,0.004 --material 2.1e9,0.35 --unit m
-  kop import net.obj --as c_shell --out net.json --opening 35deg --section 30,4 --material 2100,0.35 --scale 1000 --unit mm
+  kop import net.obj --out net.json --opening 35deg --section 30,4 --material 2100,0.35 --scale 1000 --unit mm
   kop import plan.dxf --as grid --surface vault.obj --out vault.json --section 0.004,0.05 --material 1.1e10,0.3
   kop import dome.ply --as umbrella --patch hexagon,3 --out dome.json --scale 1000
   kop import hemisphere_5t.json.gz --out hemisphere.json --plates rigid"""  # noqa: E501  # a command on one line can be copied
@@ -67,8 +67,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
     shell = parser.add_argument_group(
         "drawings",
-        "section and material are needed, of C-shells also the opening, of grids also the surface "
-        "unless the net is drawn in space",
+        "designs need section and material, C-shells also the opening, grids over flat nets the "
+        "surface",
     )
     shell.add_argument(
         "--opening",

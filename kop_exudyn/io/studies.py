@@ -126,6 +126,8 @@ def _read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"not UTF-8 text (byte {error.start})", source=path) from None
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"not TOML: {error}", source=path) from None
+    except InputError:
+        raise
     except ValueError:  # an integer of thousands of digits
         raise InputError("contains a number with too many digits", source=path) from None
 

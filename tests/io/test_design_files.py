@@ -19,6 +19,7 @@ class Named:
 
     name: str
     content: dict
+    units: None = None
 
 
 @pytest.fixture
@@ -136,8 +137,8 @@ def test_variations_are_valid(c_shell_data, change):
         (["format"], ..., "format = '(missing)': not a design file: expected 'kop_exudyn/design'"),
         (
             ["version"],
-            2,
-            "version = 2: written for a newer kop_exudyn; this one reads versions up to 1: upgrade",
+            3,
+            "version = 3: written for a newer kop_exudyn; this one reads versions up to 2: upgrade",
         ),
         (["version"], "1", "version = '1': unknown version; this kop_exudyn reads 1"),
         (["version"], ..., "version = '(missing)': unknown version; this kop_exudyn reads 1"),
