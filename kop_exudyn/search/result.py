@@ -31,6 +31,8 @@ class KitResult:
 
     designs, references : what was asked for
     stages : by name ("direct", "unrelaxed", "relaxed", "assigned")
+    at_parts : between the last two: every element its nearest part, where the assigned stage began;
+        None where the result was read from a file
     events : accepted steps of all SQPs, in order
     redeployed : by design, the state that the assigned parts open into by themselves, with those
         on the way there (`Evaluation.way`) and the stress in all of them
@@ -44,6 +46,7 @@ class KitResult:
     designs: list[Design]
     references: list[Reference]
     stages: dict[str, StageResult] = field(default_factory=dict)
+    at_parts: StageResult | None = None
     events: list[StageEvent] = field(default_factory=list)
     equilibria: int = 0
     newton_iterations: int = 0
@@ -150,7 +153,6 @@ class KitResult:
                     "distance_percent": 100 * j.distance,
                 }
                 for name, stage in self.stages.items()
-                if name in STAGES
                 for j in stage.jumps
             ],
             "status": {

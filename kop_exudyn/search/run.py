@@ -90,7 +90,7 @@ def optimize_kit(
             found["built"] = stages.confirmed(resized(stages, start, dict(parts or {})))
         elif start is not None:
             announce("path from the neighbouring kit")
-            found["built"] = stages.from_neighbour(np.concatenate(list(start)))
+            result.at_parts = stages.from_neighbour(np.concatenate(list(start)))
         else:
             announce("direct projection")
             found["direct"] = baselines.direct()
@@ -100,9 +100,9 @@ def optimize_kit(
             announce("relaxed stage")
             relaxed = stages.relaxed(found["direct"].kit)
             announce("path to the parts")
-            found["relaxed"], found["built"] = stages.to_parts(relaxed)
+            found["relaxed"], result.at_parts = stages.to_parts(relaxed)
         announce("assigned stage")
-        found["assigned"] = assigned_stage(stages, found["built"])
+        found["assigned"] = assigned_stage(stages, result.at_parts)
         announce("deployment of the assigned designs")
         found["assigned"] = opened_stage(stages, found["assigned"])
         result.redeployed = stages.redeployed(found["assigned"])

@@ -11,9 +11,10 @@ import numpy as np
 from kop_exudyn.kit.parts import Assignment, Kit
 from kop_exudyn.kit.projection import Projection
 from kop_exudyn.search.objective import Evaluation
-from kop_exudyn.search.result import KitResult
+from kop_exudyn.search.result import KitResult, summary_of
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
+from kop_exudyn.search.stage_results import StageResult
 from kop_exudyn.structures.base import Design
 
 
@@ -37,13 +38,16 @@ def project_design(
         stages=replace(stages, schedule=(factor * design.fit_weight,), rescues=0), jobs=1
     )
     result = optimize_kit([design], kit=kit, settings=settings)
-    names = {"direct": "direct", "relaxed": "relaxed", "built": "built", "assigned": "reassigned"}
     direct = result.stages["direct"].assignment
-    found = {name: _plain(result, stage, direct) for stage, name in names.items()}
-    relaxed, projection = (
-        result.stages["relaxed"],
-        Projection.of_inputs(design.groups, design.parameters),
-    )
+    relaxed = result.stages["relaxed"]
+    states = {
+        "direct": result.stages["direct"],
+        "relaxed": relaxed,
+        "built": result.at_parts,
+        "reassigned": result.stages["assigned"],
+    }
+    found = {name: _plain(result, state, direct) for name, state in states.items() if state}
+    projection = Projection.of_inputs(design.groups, design.parameters)
     found["relaxed"]["tightness"] = projection.tightness(
         relaxed.evaluations[0].q, kit, relaxed.assignment
     )
@@ -61,10 +65,9 @@ def changed_parameters(before: Assignment, after: Assignment) -> np.ndarray:
     return np.sort(np.concatenate(rows)) if rows else np.empty(0, dtype=int)
 
 
-def _plain(result: KitResult, stage: str, direct: Assignment) -> dict[str, Any]:
-    state, design = result.stages[stage], result.designs[0]
-    outcome = state.designs[0]
-    found = result.summary(stage, 0) | {
+def _plain(result: KitResult, state: StageResult, direct: Assignment) -> dict[str, Any]:
+    outcome, design = state.designs[0], result.designs[0]
+    found = summary_of(outcome, design, result.references[0]) | {
         "objective": state.value,
         "changes": direct.changes(state.assignment),
         "changed": changed_parameters(direct, state.assignment),
