@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..equilibrium.equilibria import Equilibrium
-from ..equilibrium.exudyn_model import Confirmation, ExudynModel
+from ..equilibrium.exudyn_confirm import Confirmation, confirm
 from ..equilibrium.newton import refine, solve
 from ..equilibrium.system import System
 from ..errors import InputError, SimulationFailure
@@ -97,7 +97,7 @@ def loaded_state(design: Design, unloaded: Equilibrium, case: LoadCase) -> Loade
             raise failure.within(f"{design.name}: under {share:.0%} of its loads") from None
     found = refine(system, found)
     try:
-        confirmation = ExudynModel(scene).confirm(found)
+        confirmation = confirm(scene, found)
     except SimulationFailure as failure:
         raise failure.within(f"{design.name}: under its loads") from None
     found = replace(found, state=confirmation.state)

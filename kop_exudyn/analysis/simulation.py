@@ -11,7 +11,7 @@ import numpy as np
 
 from ..compiled.library import library
 from ..equilibrium.equilibria import Equilibrium
-from ..equilibrium.exudyn_model import Confirmation, ExudynModel
+from ..equilibrium.exudyn_confirm import Confirmation, confirm
 from ..equilibrium.newton import refine
 from ..errors import SimulationFailure
 from ..scene.limits import HingeLimits
@@ -136,7 +136,7 @@ def simulate(design: Design, loads: LoadCase | None = None) -> SimulationResult:
         confirmations = {}
         for name, equilibrium in equilibria.items():
             equilibria[name] = refine(design.systems[name], equilibrium)
-            confirmations[name] = ExudynModel(design.scene(name)).confirm(equilibria[name])
+            confirmations[name] = confirm(design.scene(name), equilibria[name])
     except SimulationFailure as failure:
         doubts = "".join(f"; {doubt}" for doubt in design_doubts(design))
         raise SimulationFailure(failure.reason + doubts, where=failure.where).within(

@@ -184,7 +184,11 @@ class SceneBuilder:
 
     def pin(self, body: int, dofs: Sequence[int] = _ALL) -> None:
         """Hold a body's unknowns at their initial value: 0-2 global translation, 3-5 body-frame
-        rotation."""
+        rotation.
+
+        Of the turns, hold none, two or all three: what a single held one comes to in space depends
+        on the path, unless the body turns about one axis only.
+        """
         self._pins.extend((int(body), int(k)) for k in dofs)
 
     def mean_angle(self, hinges: Any) -> None:

@@ -9,7 +9,6 @@ every term is divided by its own scale, so F doesn't change with units. The term
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from time import perf_counter
@@ -17,7 +16,7 @@ from time import perf_counter
 import numpy as np
 
 from ..equilibrium.equilibria import Equilibrium, Start
-from ..equilibrium.exudyn_model import Confirmation, ExudynModel
+from ..equilibrium.exudyn_confirm import Confirmation, confirm
 from ..equilibrium.newton import NewtonOptions, refine, solve
 from ..equilibrium.sensitivities import Sensitivities
 from ..errors import InputError, SimulationFailure
@@ -166,7 +165,6 @@ class DesignObjective:
             for name, weight in weights.of_terms().items()
             if weight
         ]
-        self._own = threading.local()
         self._bounds: dict[str, StressBound] = {}
         if requirements.stress:
             bounds = {
@@ -317,16 +315,16 @@ class DesignObjective:
         if evaluation.confirmations:
             return evaluation
         confirmations, equilibria = {}, {}
-        models: dict[str, ExudynModel] = self._own.__dict__.setdefault("models", {})
         for role in self.design.roles:
-            if role.name not in models:
-                models[role.name] = ExudynModel(self.design.scene(role.name))
-            refined = refine(self.design.systems[role.name], evaluation.equilibria[role.name])
+            name = role.name
+            refined = refine(self.design.systems[name], evaluation.equilibria[name])
             try:
-                confirmations[role.name] = models[role.name].confirm(refined)
+                confirmations[name] = confirm(
+                    self.design.scene(name), refined, evaluation.q, role.opening
+                )
             except SimulationFailure as failure:
-                raise failure.within(f"{self.design.name}: {role.name} state") from None
-            equilibria[role.name] = replace(refined, state=confirmations[role.name].state)
+                raise failure.within(f"{self.design.name}: {name} state") from None
+            equilibria[name] = replace(refined, state=confirmations[name].state)
         return replace(evaluation, equilibria=equilibria, confirmations=confirmations)
 
     def follow(self, q: np.ndarray, previous: Evaluation, steps: int) -> list[Evaluation]:

@@ -33,6 +33,10 @@ if TYPE_CHECKING:
 _WORKSPACES = "_workspaces"  # of the solver, by thread
 
 
+# An engine's way from a start to an equilibrium, with the parameters of `equilibrium.newton.solve`.
+Solve = Callable[..., "Equilibrium"]
+
+
 @dataclass(frozen=True)
 class Target:
     """The shape that a design should keep.
@@ -110,9 +114,13 @@ class Design(ABC):
         """The scene of one of the roles; the same object at every call."""
 
     @abstractmethod
-    def deploy(self, q: np.ndarray | None = None) -> dict[str, Equilibrium]:
+    def deploy(
+        self, q: np.ndarray | None = None, solve: Solve | None = None
+    ) -> dict[str, Equilibrium]:
         """Equilibria of all roles from the design's own starting geometry (no warm start), at q
         (default: the input).
+
+        solve : of an engine, as `equilibrium.newton.solve`, which is the default
 
         Their `iterations` and `wall_s` count all solves that led to them (see `Equilibrium.after`).
         Raises SimulationFailure when one of them can't be reached.

@@ -9,7 +9,7 @@ leads into the next.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -68,9 +68,14 @@ class Way:
     diagonal: float
 
     def opened(
-        self, systems: Mapping[str, System], q: np.ndarray, assembled: Start
+        self,
+        systems: Mapping[str, System],
+        q: np.ndarray,
+        assembled: Start,
+        solve: Callable[..., Equilibrium] = solve,
     ) -> list[Equilibrium]:
-        """The states at all stations and the deployed one, each solved from the one before.
+        """The states at all stations and the deployed one, each solved from the one before, by
+        the fast solver or another engine's `solve`.
 
         Mean angles grow in half the steps from station to station, and in shorter ones where the
         assembly leaves its plane: far beyond the bifurcation an iteration may end on the other
@@ -87,7 +92,7 @@ class Way:
             passed: list[Equilibrium] = []
             try:
                 for to in steps:
-                    passed += _opened_to(system, q, before, opening, to, station, _HALVINGS)
+                    passed += _opened_to(solve, system, q, before, opening, to, station, _HALVINGS)
                     before, opening = passed[-1], to
             except SimulationFailure as failure:
                 raise failure.within(station.name) from None
@@ -162,6 +167,7 @@ class Way:
 
 
 def _opened_to(
+    solve: Callable[..., Equilibrium],
     system: System,
     q: np.ndarray,
     before: Start | Equilibrium,
@@ -176,8 +182,8 @@ def _opened_to(
     if not wrong or opening is None or to is None or not halvings:
         return [here]
     half = 0.5 * (opening + to)
-    first = _opened_to(system, q, before, opening, half, station, halvings - 1)
-    return first + _opened_to(system, q, first[-1], half, to, station, halvings - 1)
+    first = _opened_to(solve, system, q, before, opening, half, station, halvings - 1)
+    return first + _opened_to(solve, system, q, first[-1], half, to, station, halvings - 1)
 
 
 def _height(system: System, state: Equilibrium, station: Station) -> float:

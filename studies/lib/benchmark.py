@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from kop_exudyn.equilibrium.exudyn_model import solve_alone
 from kop_exudyn.equilibrium.newton import NewtonOptions, solve
 from kop_exudyn.equilibrium.system import System
 from kop_exudyn.errors import SimulationFailure
@@ -20,10 +19,10 @@ from kop_exudyn.scene.scene import Scene
 from kop_exudyn.scene.state import State
 from kop_exudyn.structures.base import Design, design_from_dict
 
+from .exudyn_alone import TRIED, best_alone
+
 Row = dict[str, Any]
 MIXED, PLAIN, EXUDYN = "mixed-stress Newton", "plain Newton", "Exudyn's static solver"
-_SAME_FORCE = 1e-9  # of the largest internal force: where all three may stop
-_EXUDYN_ITERATIONS = 100
 
 
 @dataclass(frozen=True)
@@ -116,10 +115,10 @@ def three_ways(
     """
     scene, q, start = make(fine)
     exact = solve(System(scene), q, start).state.positions[joints(fine)]
-    rows = []
+    rows, tried = [], TRIED
     for n in refinements:
         scene, q, start = make(n)
-        system, error, force = System(scene), None, None
+        system = System(scene)
         for way, options in ((MIXED, NewtonOptions()), (PLAIN, NewtonOptions(mixed=False))):
             attempt = partial(_attempt, system, q, start, options)
             timing = timed(lambda _, attempt=attempt: attempt(), runs)
@@ -127,7 +126,6 @@ def three_ways(
             if not isinstance(timing.value, SimulationFailure):
                 apart = np.linalg.norm(timing.value.state.positions[joints(n)] - exact, axis=1)
                 error = 100 * float(apart.max()) / size
-                force = float(np.abs(timing.value.stress[:, :3]).max())
                 outcome = {"iterations": timing.value.iterations, "error %": error}
             rows.append(
                 {
@@ -140,7 +138,9 @@ def three_ways(
                     "error %": outcome["error %"],
                 }
             )
-        rows.append(_exudyn(case, n, system, q, start, force, error, runs))
+        rows.append(_exudyn(case, n, system, q, start, joints(n), exact, size, runs, tried))
+        # what does best with the fewest elements is taken for all
+        tried = {name: way for name, way in tried.items() if name == rows[-1]["settings"]} or tried
     return rows
 
 
@@ -150,35 +150,26 @@ def _exudyn(
     system: System,
     q: np.ndarray,
     start: State | None,
-    force: float | None,
-    error: float | None,
+    joints: np.ndarray,
+    exact: np.ndarray,
+    size: float,
     runs: int,
+    tried: Mapping[str, tuple[int, float, bool]],
 ) -> Row:
-    """Exudyn's row; its elements are the same, so that where it converges it has the same error."""
-    found = [
-        solve_alone(
-            system.scene,
-            q,
-            _EXUDYN_ITERATIONS,
-            start=start,
-            residual=None if force is None else _SAME_FORCE * force,
-        )
-        for _ in range(runs)
-    ]
-    times, converged = (
-        [float(f["seconds"]) for f in found],
-        isinstance(found[-1]["iterations"], int),
-    )
+    """Exudyn's row; its error is that of its own positions."""
+    found = best_alone(system.scene, q, start, runs=runs, tried=tried)
+    error = None
+    if found.state is not None:
+        apart = np.linalg.norm(found.state.positions[joints] - exact, axis=1)
+        error = 100 * float(apart.max()) / size
     return {
         "case": case,
         "elements a piece": n,
         "unknowns": system.n_unknowns,
         "way": EXUDYN,
-        "iterations": found[-1]["iterations"],
-        "seconds": median(times),
-        "least": min(times),
-        "most": max(times),
-        "error %": error if converged else None,
+        "iterations": found.steps if found.state is not None else found.reason,
+        **found.columns,
+        "error %": error,
     }
 
 

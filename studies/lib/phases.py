@@ -17,7 +17,6 @@ from unittest.mock import patch
 
 import numpy as np
 
-from kop_exudyn.equilibrium.exudyn_model import ExudynModel
 from kop_exudyn.equilibrium.sensitivities import Sensitivities
 from kop_exudyn.equilibrium.system import System
 from kop_exudyn.kit.projection import Projection
@@ -34,7 +33,7 @@ PHASES: Mapping[str, Sequence[tuple[Any, str]]] = {
     "Newton, rest": [(objective, "solve"), (objective, "refine")],
     "sensitivities": [(DesignObjective, "derivatives"), (Sensitivities, "predict")],
     "target fitting": [(DesignObjective, "judge")],
-    "Exudyn": [(ExudynModel, "confirm"), (ExudynModel, "__init__")],
+    "Exudyn": [(objective, "confirm")],
     "projection": [(Projection, "minimise"), (Projection, "hessian")],
     "QP": [(QPSolver, "solve")],
 }

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from kop_exudyn.compiled.library import library
-from kop_exudyn.equilibrium.exudyn_model import ExudynModel
+from kop_exudyn.equilibrium.exudyn_confirm import confirm
 from kop_exudyn.equilibrium.newton import refine
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.designs import load_design
@@ -38,9 +38,7 @@ def compared_plates(file: Path, runs: int) -> dict[str, Any]:
             begin = process_time()
             equilibrium = own.deploy()["deployed"]
             times.append(process_time() - begin)
-        confirmation = ExudynModel(own.scene()).confirm(
-            refine(own.systems["deployed"], equilibrium)
-        )
+        confirmation = confirm(own.scene(), refine(own.systems["deployed"], equilibrium))
         joints[model] = own.report_positions(confirmation.state)
         energies[model] = equilibrium.elastic_energy
         apart = _percent_apart(joints[model], joints[RODS])

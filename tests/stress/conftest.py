@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kop_exudyn.equilibrium.exudyn_model import ExudynModel
+from kop_exudyn.equilibrium import exudyn_confirm
 from kop_exudyn.equilibrium.newton import refine, solve
 from kop_exudyn.equilibrium.system import System
 from kop_exudyn.rods.rotations import exp_se3
@@ -72,7 +72,7 @@ def equilibrium(scene, start=None, confirm=True):
     system = System(scene)
     eq = solve(system, NONE, start)
     if confirm:
-        confirmation = ExudynModel(scene).confirm(refine(system, eq))
+        confirmation = exudyn_confirm.confirm(scene, refine(system, eq))
         assert confirmation.newton_steps <= 2 and confirmation.moved < 1e-8
     return eq
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kop_exudyn.equilibrium.equilibria import Start
-from kop_exudyn.equilibrium.exudyn_model import ExudynModel
+from kop_exudyn.equilibrium.exudyn_confirm import confirm
 from kop_exudyn.rods.rotations import exp_so3
 from lib.stress.random_scenes import random_case
 from lib.stress.trial import STABLE, run_case
@@ -56,7 +56,7 @@ def test_exudyn_confirms_in_any_unit(unit, young):
     """Joint equations are lengths: beside forces of 1e-20 their round-off used to look like a
     residual."""
     case = random_case(6, unit=unit, young=young)
-    confirmation = ExudynModel(case.scene).confirm(run_case(case).equilibrium)
+    confirmation = confirm(case.scene, run_case(case).equilibrium)
     assert confirmation.residual < 1e-7 and confirmation.moved < 1e-8
 
 

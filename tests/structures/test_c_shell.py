@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kop_exudyn.analysis.simulation import simulate
-from kop_exudyn.equilibrium.exudyn_model import ExudynModel
+from kop_exudyn.equilibrium.exudyn_confirm import confirm
 from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.errors import InputError
 from kop_exudyn.search.input_fit import fit_input
@@ -150,7 +150,7 @@ def test_inflected_curves_assemble_without_stress_too():
 
 def test_exudyn_confirms_both_states(shell, states):
     for role, equilibrium in states.items():
-        confirmation = ExudynModel(shell.scene(role)).confirm(equilibrium)
+        confirmation = confirm(shell.scene(role), equilibrium)
         assert confirmation.newton_steps <= 2 and confirmation.moved < 1e-8
 
 

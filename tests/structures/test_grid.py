@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kop_exudyn.analysis.simulation import simulate
-from kop_exudyn.equilibrium.exudyn_model import ExudynModel
+from kop_exudyn.equilibrium.exudyn_confirm import confirm
 from kop_exudyn.equilibrium.newton import NewtonOptions, solve
 from kop_exudyn.equilibrium.sensitivities import Sensitivities
 from kop_exudyn.errors import InputError, SimulationFailure
@@ -189,7 +189,7 @@ def test_the_grid_keeps_to_its_surface_and_exudyn_agrees(saddle, deployed):
     assert deployed.stable and deployed.elastic_energy > 0
     fit = TargetFitting(saddle.target)(deployed.state.positions[saddle.joints])
     assert fit.max_percent < 0.2
-    confirmation = ExudynModel(saddle.scene()).confirm(deployed)
+    confirmation = confirm(saddle.scene(), deployed)
     assert confirmation.moved < 1e-9
 
 

@@ -7,7 +7,7 @@ import copy
 import numpy as np
 import pytest
 
-from kop_exudyn.equilibrium.exudyn_model import ExudynModel
+from kop_exudyn.equilibrium.exudyn_confirm import confirm
 from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.equilibrium.sensitivities import Sensitivities
 from kop_exudyn.equilibrium.system import System
@@ -150,7 +150,7 @@ def test_rigid_plates_are_drawn(design, deployed):
 
 
 def test_exudyn_confirms_the_final_state(design, deployed):
-    confirmation = ExudynModel(design.scene()).confirm(deployed)
+    confirmation = confirm(design.scene(), deployed)
     assert confirmation.moved < 1e-8 and confirmation.residual < 1e-8
 
 

@@ -8,7 +8,7 @@ import json
 import numpy as np
 import pytest
 
-from kop_exudyn.equilibrium.exudyn_model import ExudynModel
+from kop_exudyn.equilibrium.exudyn_confirm import confirm
 from kop_exudyn.errors import InputError
 from kop_exudyn.files.documents import check_schema
 from kop_exudyn.io.designs import load_design
@@ -127,7 +127,7 @@ def test_models_deploy_stably_near_their_target(repository, name):
     assert design.spacings(state.state) == pytest.approx(15.0, rel=0.02)
     fit = TargetFitting(design.target, 0.1)(state.state.positions[design.joints])
     assert fit.max_percent < 5 and fit.mean_percent < 1.5
-    confirmation = ExudynModel(design.scene()).confirm(state)
+    confirmation = confirm(design.scene(), state)
     assert confirmation.residual < 1e-6
     strength = design_strength(design, {"deployed": state})["deployed"]
     assert np.isfinite(strength.limit).all() and 0.2 < strength.largest < 0.6

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from kop_exudyn.equilibrium.exudyn_model import ExudynModel
+from kop_exudyn.equilibrium.exudyn_confirm import confirm
 from kop_exudyn.equilibrium.newton import NewtonOptions, solve
 from kop_exudyn.equilibrium.system import System
-from kop_exudyn.errors import InputError
+from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.files.documents import check_schema
+from kop_exudyn.scene.actuators import LinearActuators
 from kop_exudyn.search.objective import DesignObjective, Weights
 from kop_exudyn.structures.base import design_from_dict
 from kop_exudyn.structures.umbrella.generator import (
@@ -63,6 +65,66 @@ def test_pinned_joints_are_where_they_should_be(design, deployed):
     assert design.systems["deployed"].scene.pinned.sum() == 0
 
 
+def test_exudyn_refuses_other_pins_plates_and_heights(design, deployed):
+    """The right state of this mesh, offered as that of another one."""
+    scene = design.scene()
+    assert confirm(scene, deployed).gaps["pin"] < 1e-12
+    q = design.parameters.copy()
+    q[12] += 1e-3
+    with pytest.raises(SimulationFailure, match="pin is off by"):
+        confirm(scene, deployed, q=q)
+    away = deployed.state.transformed(np.eye(3), np.array([0.0, scene.size, 0.0]))
+    with pytest.raises(SimulationFailure, match="pin is off by"):
+        confirm(scene, replace(deployed, state=away))
+    actuators = scene.terms[0]
+    higher = LinearActuators(
+        actuators.top,
+        actuators.bottom,
+        1.001 * actuators.spacing,
+        actuators.weight,
+        extension=actuators.extension,
+        shear=actuators.shear,
+    )
+    with pytest.raises(SimulationFailure, match="moved the state"):
+        confirm(scene.with_terms(higher), deployed)
+    if design.plate_model == "rods":
+        stiffness = scene.stiffness.copy()
+        plates = scene.length_parameter < 0
+        stiffness[plates] *= 1.001
+        with pytest.raises(SimulationFailure, match="moved the state"):
+            confirm(replace(scene, stiffness=stiffness), deployed)
+    else:
+        offset = scene.node_offset.copy()
+        offset[scene.node_hinge < 0] *= 1.0001  # where the plates' middles are
+        centre = scene.hinge_centre * 1.0001
+        with pytest.raises(SimulationFailure, match="moved the state"):
+            confirm(replace(scene, node_offset=offset, hinge_centre=centre), deployed)
+
+
+@pytest.mark.parametrize("plate_model", ["rods", "rigid"])
+def test_a_mesh_without_pins_is_held_at_places_of_its_target(plate_model):
+    """Six coordinates of three X joints, which carry no force: without them, nothing changes."""
+    content = {key: value for key, value in bowl().items() if key != "pins"}
+    design = design_from_dict(content | {"plate_model": plate_model})
+    deployed = design.deploy()["deployed"]
+    scene, anchor = design.scene(), design._anchor
+    x = deployed.state.positions[design.joints]
+    assert scene.pinned.sum() == 6 and len(set(anchor.joints.tolist())) == 3
+    assert np.allclose(x[anchor.joints, anchor.axes], anchor.values, rtol=0, atol=1e-9 * scene.size)
+    target = design.mesh.target.crossings[anchor.joints, anchor.axes]
+    assert np.array_equal(anchor.values, target)
+    gradient = np.zeros(scene.n_dofs)
+    system = System(scene.with_pins(np.zeros(scene.n_dofs, bool)))
+    system.set_parameters(design.parameters)
+    system.assemble(deployed.state)
+    gradient[system.sparsity.free] = system.gradient[: system.n_unknowns]
+    assert np.abs(gradient).max() < 1e-7 * system.force_scale()[0] * scene.length_scale
+    confirm(scene, deployed)
+    away = deployed.state.transformed(np.eye(3), np.array([0.0, 0.0, scene.size]))
+    with pytest.raises(SimulationFailure, match="pin is off by"):
+        confirm(scene, replace(deployed, state=away))
+
+
 def test_the_mesh_is_laid_on_its_pins_wherever_they_are(design, deployed):
     q = design.parameters.copy()
     turn = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])
@@ -75,7 +137,7 @@ def test_the_mesh_is_laid_on_its_pins_wherever_they_are(design, deployed):
 
 
 def test_exudyn_confirms_the_pinned_state(design, deployed):
-    confirmation = ExudynModel(design.scene()).confirm(deployed)
+    confirmation = confirm(design.scene(), deployed)
     assert confirmation.moved < 1e-8 and confirmation.residual < 1e-7
 
 

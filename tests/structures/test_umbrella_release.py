@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from kop_exudyn.equilibrium.exudyn_model import ExudynModel
+from kop_exudyn.equilibrium.exudyn_confirm import confirm
 from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.equilibrium.sensitivities import Sensitivities
 from kop_exudyn.errors import InputError
@@ -82,7 +82,7 @@ def test_rigid_plates_are_cheaper_and_nearly_the_same(content):
     assert states[1].elastic_energy == pytest.approx(states[0].elastic_energy, rel=0.03)
     unknowns = [design.systems["deployed"].n_unknowns for design in (rods, rigid)]
     assert unknowns[1] < 0.75 * unknowns[0]
-    confirmation = ExudynModel(rigid.scene()).confirm(states[1])
+    confirmation = confirm(rigid.scene(), states[1])
     assert confirmation.moved < 1e-8 and confirmation.newton_steps <= 2
 
 
@@ -91,7 +91,7 @@ def test_lilium_deploys_ends_stable_and_is_confirmed_by_exudyn(content):
     design = Umbrella.from_release(content("lilium"), "lilium")
     state = design.deploy()["deployed"]
     assert state.stable and state.residual < 1e-8
-    confirmation = ExudynModel(design.scene()).confirm(state)
+    confirmation = confirm(design.scene(), state)
     assert confirmation.residual < 1e-7 and confirmation.moved < 1e-7
     assert design.spacings(state.state) == pytest.approx(design.mesh.spacing, rel=1e-2)
 

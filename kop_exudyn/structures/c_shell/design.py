@@ -22,7 +22,8 @@ from typing import Any
 import numpy as np
 
 from ...equilibrium.equilibria import Equilibrium, Start
-from ...equilibrium.newton import NewtonOptions, solve
+from ...equilibrium.newton import NewtonOptions
+from ...equilibrium.newton import solve as fast
 from ...equilibrium.system import System
 from ...errors import InputError, SimulationFailure
 from ...geometry.linkage import refuse_loose_parts
@@ -31,7 +32,7 @@ from ...geometry.network_faces import triangulate
 from ...geometry.triangles import TriangleSurface
 from ...rods.sections import material_from_dict, section_from_dict
 from ...scene.scene import Scene
-from ..base import Design, Role, Target, register_class, register_rescaling
+from ..base import Design, Role, Solve, Target, register_class, register_rescaling
 from ..mesh_target import load_target_mesh, target_on_mesh
 from ..opening import Station, Way
 from .opening import check_hinges, check_opening
@@ -122,7 +123,11 @@ class CShell(Design):
     def smooth_path(self) -> list[Equilibrium]:
         """The smooth design's equilibria from the flat network to the opening, in steps of about
         0.1 rad."""
-        path = open_up(System(self.smooth), self.flat_angle, self.opening, self.side)
+        return self._open_smooth(fast)
+
+    def _open_smooth(self, engine: Solve) -> list[Equilibrium]:
+        system = System(self.smooth)
+        path = open_up(system, self.flat_angle, self.opening, self.side, engine)
         try:
             for equilibrium in path:
                 check_hinges(self.network, equilibrium.state)
@@ -130,12 +135,15 @@ class CShell(Design):
             raise failure.within("smooth design") from None
         return path
 
-    def deploy(self, q: np.ndarray | None = None) -> dict[str, Equilibrium]:
+    def deploy(
+        self, q: np.ndarray | None = None, solve: Solve | None = None
+    ) -> dict[str, Equilibrium]:
         """Rest from the flat network; deployed from there, as a builder opens it.
 
         Where no equilibrium is found on that way, the input's deployed state is the one that the
         smooth design's leads to.
         """
+        solve, path = (fast, self.smooth_path) if solve is None else (solve, [])
         given, q = q is not None, self.parameters if q is None else q
         try:
             start = Start(self.scene("rest").initial)
@@ -144,33 +152,34 @@ class CShell(Design):
         except SimulationFailure as failure:
             raise failure.within("rest state") from None
         try:
-            deployed = self._opened(q, rest) if given else self._opened_or_led(q, rest)
+            deployed = (self._opened if given else self._opened_or_led)(q, rest, solve)
             check_hinges(self.network, deployed.state)
         except SimulationFailure as failure:
             raise failure.within("deployed state") from None
-        return {"deployed": deployed.after(*self.smooth_path), "rest": rest}
+        return {"deployed": deployed.after(*path), "rest": rest}
 
-    def _opened(self, q: np.ndarray, rest: Equilibrium) -> Equilibrium:
-        opened = self.way.opened(self.systems, q, self.assembled(q, {"rest": rest}))
+    def _opened(self, q: np.ndarray, rest: Equilibrium, solve: Solve) -> Equilibrium:
+        opened = self.way.opened(self.systems, q, self.assembled(q, {"rest": rest}), solve)
         return opened[-1].after(*opened[:-1])
 
-    def _opened_or_led(self, q: np.ndarray, rest: Equilibrium) -> Equilibrium:
+    def _opened_or_led(self, q: np.ndarray, rest: Equilibrium, solve: Solve) -> Equilibrium:
         try:
-            return self._opened(q, rest)
+            return self._opened(q, rest, solve)
         except SimulationFailure as failure:
             log.warning("%s doesn't open from its flat assembly: %s", self.name, failure)
-        return self._led(q)
+        return self._led(q, solve)
 
-    def _led(self, q: np.ndarray) -> Equilibrium:
+    def _led(self, q: np.ndarray, solve: Solve) -> Equilibrium:
         """The deployed state that the smooth design's leads to."""
-        path = self.smooth_path
+        path = self.smooth_path if solve is fast else self._open_smooth(solve)
         start = self.layout.straightened(path[-1].state, self.scene("deployed"))
-        return solve(
+        found = solve(
             self.systems["deployed"],
             q,
             Start(start, path[-1].torque),
             self.fitted_role.opening,
         )
+        return found if solve is fast else found.after(*path)
 
     @cached_property
     def way(self) -> Way:
@@ -248,11 +257,13 @@ class CShell(Design):
         )
 
 
-def open_up(system: System, flat: float, opening: float, side: int) -> list[Equilibrium]:
+def open_up(
+    system: System, flat: float, opening: float, side: int, solve: Solve = fast
+) -> list[Equilibrium]:
     """Open a smooth design by its mean opening angle, through the bifurcation to the chosen side of
     the plane.
 
-    flat : the mean angle of the flat network, the scene's initial state
+    flat : the mean angle of the flat network, the scene's initial state; solve : an engine's
     """
     scene = system.scene
     steps = max(1, int(np.ceil(abs(opening) / _OPENING_STEP - 1e-9)))

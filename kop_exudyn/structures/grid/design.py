@@ -18,7 +18,7 @@ from ...errors import InputError, SimulationFailure
 from ...geometry.network import CurveNetwork
 from ...geometry.surfaces import AnalyticSurface, ScaledSurface, Surface
 from ...rods.sections import Material, Section, material_from_dict, section_from_dict
-from ..base import Design, Role, Target, register_class, register_rescaling
+from ..base import Design, Role, Solve, Target, register_class, register_rescaling
 from ..loads import hold_in_place
 from .grid_network import network_on
 from .lamellas import straighten_on
@@ -90,10 +90,13 @@ class Grid(Design):
     def scene(self, role: str = "deployed") -> Scene:
         return self._model.scene
 
-    def deploy(self, q: np.ndarray | None = None) -> dict[str, Equilibrium]:
+    def deploy(
+        self, q: np.ndarray | None = None, solve: Solve | None = None
+    ) -> dict[str, Equilibrium]:
         """The equilibrium nearest to the design surface: solved from the lamellas' places there."""
-        from ...equilibrium.newton import solve
+        from ...equilibrium.newton import solve as fast
 
+        solve = fast if solve is None else solve
         try:
             return {
                 "deployed": solve(self.systems["deployed"], self.parameters if q is None else q)

@@ -14,7 +14,7 @@ from ...errors import InputError, SimulationFailure
 from ...kit.groups import ElementGroup
 from ...rods.sections import Material, material_from_dict
 from ...units import Units
-from ..base import Design, Role, Target, register_class, register_format
+from ..base import Design, Role, Solve, Target, register_class, register_format
 from ..fitting import best_placement
 from ..hardware import CellHardware
 from .bodies import RODS, joint_bodies
@@ -22,11 +22,11 @@ from .deployment import Deployment, Solver, Stage, drawn_towards, follow, state_
 from .hardware import cell_hardware
 from .layout import BaseMesh, Plates, umbrella_mesh
 from .mesh import UmbrellaMesh, UmbrellaTarget
-from .pins import Pins, pins_from_dict
+from .pins import Anchor, Pins, anchor_on, pins_from_dict
 from .release import is_release, release_mesh
 
 if TYPE_CHECKING:
-    from ...equilibrium.equilibria import Equilibrium
+    from ...equilibrium.equilibria import Equilibrium, Start
     from ...scene.attraction import Attraction
     from ...scene.scene import Scene
     from ...scene.state import State
@@ -53,7 +53,7 @@ class Umbrella(Design):
     joint_limits : weight of the soft limits of the joints' turns, T joints 0 to 90, X joints 0 to
         180 degrees; 1 as published, 0 for joints that turn without limits
     least_length : lower bound of arm lengths, default 32/30 of the plate edge
-    pins : supports in the final state; without them the central X joint is held
+    pins : supports in the final state; without them it is held without force (see `Anchor`)
     deployment : how it is opened
     """
 
@@ -131,8 +131,8 @@ class Umbrella(Design):
         )
 
     def scene(self, role: str = "deployed") -> Scene:
-        """The final state's scene: actuators of weight 1, no attraction, pins or the central X
-        joint held."""
+        """The final state's scene: actuators of weight 1, no attraction, on pins or held in
+        place."""
         return self._held if self.pins is None else self._pinned
 
     @cached_property
@@ -144,40 +144,58 @@ class Umbrella(Design):
         )
 
     @cached_property
+    def _anchor(self) -> Anchor | None:
+        """Where an unsupported mesh is held, by places in its target."""
+        target = self.mesh.target
+        return None if target is None else anchor_on(target, self.mesh.central_crossing)
+
+    @cached_property
     def _held(self) -> Scene:
-        """With the central X joint held."""
+        """Held at its anchor, or, without a target, with the central X joint in the compact
+        state."""
         scene = self._model.scene
+        if self._anchor is not None:
+            return self._anchor.scene(scene, self.joints)
         pinned = np.zeros(scene.n_dofs, bool)
         centre = self.joints[self.mesh.central_crossing]
         pinned[6 * centre : 6 * centre + 6] = True
         return scene.with_pins(pinned)
 
-    def deploy(self, q: np.ndarray | None = None) -> dict[str, Equilibrium]:
+    def deploy(
+        self, q: np.ndarray | None = None, solve: Solve | None = None
+    ) -> dict[str, Equilibrium]:
         """Open the mesh from its compact state, along the path that `deployment` describes.
 
-        At its end the attraction is gone and the central X joint held where it is, or the mesh laid
+        At its end the attraction is gone and the mesh moved, as it is, to where it is held, or laid
         on its pins. `escapes` of the equilibrium counts the unstable states that were left on the
         way: where there are any, the mesh may open to another shape. Raises SimulationFailure.
         """
-        if q is None:
+        if q is None and solve is None:
             return {"deployed": self.deployed}  # solved for once, whoever asks
-        return {"deployed": self._opened(np.asarray(q, float))}
+        q = self.parameters if q is None else np.asarray(q, float)
+        return {"deployed": self._opened(q, solve)}
 
-    def _opened(self, q: np.ndarray) -> Equilibrium:
+    def _opened(self, q: np.ndarray, solve: Solve | None = None) -> Equilibrium:
         try:
-            *done, final = follow(*self._path(q), self.deployment, self.name)
+            *done, final = follow(*self._path(q, solve), self.deployment, self.name)
         except SimulationFailure as failure:
             try:
-                *done, final = follow(*self._path(q, gentle=True), self.deployment, self.name)
+                *done, final = follow(
+                    *self._path(q, solve, gentle=True), self.deployment, self.name
+                )
             except SimulationFailure:
                 raise failure from None
         return final.after(*done)
 
-    def _path(self, q: np.ndarray, gentle: bool = False) -> tuple[State, list[Stage], Solver]:
+    def _path(
+        self, q: np.ndarray, solve: Solve | None, gentle: bool = False
+    ) -> tuple[State, list[Stage], Solver]:
         """The compact state as near to the target as it can be, the stages, and what solves one."""
-        from ...equilibrium.newton import NewtonOptions, solve
+        from ...equilibrium.newton import NewtonOptions
+        from ...equilibrium.newton import solve as fast
         from ...equilibrium.system import System
 
+        solve = fast if solve is None else solve
         model, attraction = self._model, self.attractions()
         compact = model.compact(q, self.deployment.angle)
         if attraction:
@@ -190,13 +208,8 @@ class Umbrella(Design):
 
         def reach(stage: Stage, start: State | Equilibrium, iterations: int) -> Equilibrium:
             if stage.final:
-                options = NewtonOptions(max_iterations=iterations)
-                if self.pins is not None:
-                    places = q[self.mesh.lengths.size :].reshape(-1, 3)
-                    start = self.pins.aligned(
-                        state_of(start), self.joints[self.pins.joints], places
-                    )
-                return solve(self.systems["deployed"], q, start, options=options)
+                options, begin = NewtonOptions(max_iterations=iterations), self._laid(q, start)
+                return solve(self.systems["deployed"], q, begin, options=options)
             spacing = upright + stage.opening * (self.mesh.spacing - upright)
             actuators = model.actuators.weighted(stage.actuators * model.energy_scale, spacing)
             drawn = (
@@ -207,6 +220,18 @@ class Umbrella(Design):
             return solve(system, q, start, options=options)
 
         return compact, self.deployment.path(gentle), reach
+
+    def _laid(self, q: np.ndarray, state: State | Equilibrium) -> State | Start | Equilibrium:
+        """An open mesh, moved rigidly to where the final state is held."""
+        from ...equilibrium.equilibria import Equilibrium, Start
+
+        if self.pins is not None:
+            places = q[self.mesh.lengths.size :].reshape(-1, 3)
+            return self.pins.aligned(state_of(state), self.joints[self.pins.joints], places)
+        if self._anchor is None:
+            return state
+        placed = self._anchor.placed(state_of(state), self.joints)
+        return Start(placed, stress=state.stress if isinstance(state, Equilibrium) else None)
 
     def attractions(self) -> tuple[Attraction, ...]:
         """The attraction during deployment, of weight 1: X joints and cell midpoints to their

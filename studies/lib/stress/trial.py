@@ -9,7 +9,7 @@ import numpy as np
 
 from kop_exudyn.equilibrium.direction import border_of, is_convex
 from kop_exudyn.equilibrium.equilibria import Equilibrium, Start
-from kop_exudyn.equilibrium.exudyn_model import ExudynModel
+from kop_exudyn.equilibrium.exudyn_confirm import confirm
 from kop_exudyn.equilibrium.newton import NewtonOptions, refine, solve
 from kop_exudyn.equilibrium.stability import softest_mode
 from kop_exudyn.equilibrium.system import System
@@ -117,7 +117,7 @@ def judge(case: StressCase, eq: Equilibrium) -> tuple[str, str]:
     eigenvalue = softest_mode(system).eigenvalue
     if not eigenvalue > 0:
         return "unstable", f"the softest mode's eigenvalue is {eigenvalue:.2e}"
-    ExudynModel(case.scene).confirm(refine(system, eq))
+    confirm(case.scene, refine(system, eq))
     return STABLE, ""
 
 
