@@ -27,7 +27,7 @@ typedef struct {
 
 #define PADDED(m) (((m) + LANES - 1) / LANES * LANES)
 #define COLUMNS 64 /* right-hand sides of a block, as in equilibrium/block_solve.py */
-#define STEP 8 /* columns of a panel that are eliminated before the others catch up */
+#define STEP 8     /* columns of a panel that are eliminated before the others catch up */
 
 INLINE lanes load(const double *from) { return *(const lanes_u *)from; }
 INLINE void store(double *to, lanes x) { *(lanes_u *)to = x; }
@@ -36,7 +36,7 @@ INLINE void store(double *to, lanes x) { *(lanes_u *)to = x; }
 INLINE void subtract_products(double *const *c, int count, int width, const double *b, int64_t ldb,
                               const double *w, int64_t step, int64_t next, int64_t depth)
 {
-    lanes sum[4][4];
+    lanes sum[4][8];
     for (int q = 0; q < count; q++)
         for (int i = 0; i < width; i++)
             sum[q][i] = load(c[q] + LANES * i);
@@ -220,11 +220,12 @@ void solve(const Supernodes *s, const double *panels, const double *D, double *x
 INLINE void subtract_rows(double *const *c, int count, const double *b, const double *w,
                           int64_t step, int64_t next, int64_t depth)
 {
-    for (int64_t i = 0; i < COLUMNS; i += 2 * LANES) {
+    const int width = count == 1 ? 8 : count == 2 ? 4 : 2; /* sums that don't wait for each other */
+    for (int64_t i = 0; i < COLUMNS; i += width * LANES) {
         double *at[4];
         for (int q = 0; q < count; q++)
             at[q] = c[q] + i;
-        subtract_products(at, count, 2, b + i, COLUMNS, w, step, next, depth);
+        subtract_products(at, count, width, b + i, COLUMNS, w, step, next, depth);
     }
 }
 
@@ -255,9 +256,13 @@ static void substitute(const Supernodes *s, const double *panels, const double *
         const double *P = panels + s->panel_start[t];
         const int32_t *rows = s->rows + s->row_start[t];
         double *own = X + s->first[t] * COLUMNS;
-        for (int64_t i = 1; i < k; i++) {
-            at[0] = own + i * COLUMNS;
-            subtract_rows(at, 1, own, P + i, height, 1, i);
+        for (int64_t i = 0; i < k; i += 4) {
+            int64_t count = k - i < 4 ? k - i : 4;
+            for (int64_t q = 0; q < count; q++)
+                at[q] = own + (i + q) * COLUMNS;
+            subtract_up_to_four(at, count, own, P + i, height, 1, i);
+            for (int64_t q = 1; q < count; q++)
+                subtract_rows(at + q, 1, at[0], P + i * height + i + q, height, 1, q);
         }
         for (int64_t i = 0; i < m; i += 4) {
             int64_t count = m - i < 4 ? m - i : 4;
@@ -275,20 +280,26 @@ static void substitute(const Supernodes *s, const double *panels, const double *
         const int32_t *rows = s->rows + s->row_start[t];
         double *own = X + s->first[t] * COLUMNS;
         for (int64_t p = 0; p < k; p++)
-            for (int64_t c = 0; c < COLUMNS; c++)
-                own[p * COLUMNS + c] /= D[s->first[t] + p];
+            for (int64_t c = 0; c < COLUMNS; c += LANES)
+                store(own + p * COLUMNS + c, load(own + p * COLUMNS + c) / D[s->first[t] + p]);
         for (int64_t i = 0; i < m; i++)
-            memcpy(gathered + i * COLUMNS, X + rows[i] * (int64_t)COLUMNS,
-                   sizeof(double) * COLUMNS);
+            for (int64_t c = 0; c < COLUMNS; c += LANES)
+                store(gathered + i * COLUMNS + c, load(X + rows[i] * (int64_t)COLUMNS + c));
         for (int64_t p = 0; p < k; p += 4) {
             int64_t count = k - p < 4 ? k - p : 4;
             for (int64_t q = 0; q < count; q++)
                 at[q] = own + (p + q) * COLUMNS;
             subtract_up_to_four(at, count, gathered, P + p * height + k, 1, height, m);
         }
-        for (int64_t p = k - 2; p >= 0; p--) {
-            at[0] = own + p * COLUMNS;
-            subtract_rows(at, 1, own + (p + 1) * COLUMNS, P + p * height + p + 1, 1, 0, k - 1 - p);
+        for (int64_t p = (k - 1) / 4 * 4; p >= 0; p -= 4) {
+            int64_t count = k - p < 4 ? k - p : 4, end = p + count;
+            for (int64_t q = 0; q < count; q++)
+                at[q] = own + (p + q) * COLUMNS;
+            subtract_up_to_four(at, count, own + end * COLUMNS, P + p * height + end, 1, height,
+                                k - end);
+            for (int64_t q = count - 2; q >= 0; q--)
+                subtract_rows(at + q, 1, at[q + 1], P + (p + q) * height + p + q + 1, 1, 0,
+                              count - 1 - q);
         }
     }
 }
@@ -344,11 +355,16 @@ void multiply_blocks(int64_t m, const int32_t *indptr, const int64_t *places, co
     for (int64_t first = 0; first < count; first += COLUMNS) {
         int64_t width = count - first < COLUMNS ? count - first : COLUMNS;
         for (int64_t i = 0; i < m; i++) {
-            double sum[COLUMNS] = {0};
-            for (int32_t a = indptr[i]; a < indptr[i + 1]; a++) {
-                const double *row = blocks + (first * n + places[a] * COLUMNS);
-                for (int64_t c = 0; c < COLUMNS; c++)
-                    sum[c] += data[a] * row[c];
+            double sum[COLUMNS];
+            for (int64_t c = 0; c < COLUMNS; c += 4 * LANES) {
+                lanes part[4] = {{0}};
+                for (int32_t a = indptr[i]; a < indptr[i + 1]; a++) {
+                    const double *row = blocks + first * n + places[a] * COLUMNS + c;
+                    for (int k = 0; k < 4; k++)
+                        part[k] += data[a] * load(row + LANES * k);
+                }
+                for (int k = 0; k < 4; k++)
+                    store(sum + c + LANES * k, part[k]);
             }
             memcpy(out + i * count + first, sum, sizeof(double) * width);
         }
