@@ -20,6 +20,7 @@ from .values import (
 
 if TYPE_CHECKING:
     from ..io.studies import Study
+    from ..search.requirements import Requirements
 
 HELP = "find one kit of parts for several designs"
 DESCRIPTION = """Finds one kit of parts from which all designs of a folder, or of a study file, can
@@ -28,8 +29,8 @@ them. Checkpoints are written on the way: --resume goes on where a run was stopp
 same result. Running the same job again replaces its results.
 
 A study file is TOML: format = "kop_exudyn/study", version = 1, designs (a list of files or
-folders), and, if wanted, the tables parts, weights and settings. Options given here come before
-what it says."""
+folders), and, if wanted, the tables parts, weights, settings and requirements. Options given here
+come before what it says."""
 EXAMPLES = """examples:
   kop optimize models/conformals --designs 3 --parts linear=12,angular=5 --out out/kit
   kop optimize models/conformals --designs 02_tanh,07_log --parts linear=8,angular=3 --out out/pair
@@ -135,8 +136,20 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--redeployments",
         type=not_negative,
         metavar="N",
-        help="how often the designs are then opened from their assembly and the second stage goes "
-        "on from where they end, so that they open into their shape by themselves (default: 0)",
+        help="how often the second stage goes on from where the designs open into, while that is "
+        "another state (default: 2)",
+    )
+    parser.add_argument(
+        "--safety",
+        type=positive_number,
+        metavar="F",
+        help="factor by which the elastic limit is divided (default: 1)",
+    )
+    parser.add_argument(
+        "--without",
+        choices=("opening", "stress", "both"),
+        help="don't require that designs open by themselves, that stress keeps below the elastic "
+        "limit, or either: to see what that costs",
     )
     add_json(
         parser,
@@ -197,7 +210,11 @@ def run(args: argparse.Namespace) -> int:
     Weights.of(args.weights or {})  # names that aren't terms are found before anything is read
     study = replace(
         study,
-        settings=replace(study.settings, **_given(args)),
+        settings=replace(
+            study.settings,
+            requirements=_required(args, study.settings.requirements),
+            **_given(args),
+        ),
         weights={**study.weights, **(args.weights or {})},
     )
     designs = study.designs()
@@ -291,6 +308,17 @@ def _given(args: argparse.Namespace) -> dict[str, Any]:
     steps = dict.fromkeys(("relaxed_steps", "assigned_steps", "round_steps"), args.max_steps)
     given = {"seed": args.seed, "leaps": args.leaps, "redeployments": args.redeployments, **steps}
     return {name: value for name, value in given.items() if value is not None}
+
+
+def _required(args: argparse.Namespace, known: Requirements) -> Requirements:
+    """A study's requirements with what options say of them."""
+    from dataclasses import replace
+
+    left_out = ("opening", "stress") if args.without == "both" else (args.without,)
+    changes: dict[str, Any] = {name: False for name in left_out if name is not None}
+    if args.safety is not None:
+        changes["safety"] = args.safety
+    return replace(known, **changes)
 
 
 def singular(kind: str) -> str:

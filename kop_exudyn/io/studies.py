@@ -17,6 +17,7 @@ from ..files.documents import check_envelope, check_range, check_schema
 from ..files.files import read_bytes
 from ..kit.kinds import Bounds
 from ..search.objective import Weights
+from ..search.requirements import Requirements
 from ..search.settings import JobSettings, StageSettings
 from ..structures.base import Design
 from .designs import design_files, load_all, select_among
@@ -104,6 +105,7 @@ def _from_file(path: Path) -> Study:
         raise error.at(path) from None
     counts = _files(data["designs"], path)
     settings = dict(data.get("settings", {}))
+    settings["requirements"] = Requirements(**data.get("requirements", {}))
     if "schedule" in settings:
         settings["schedule"] = tuple(settings["schedule"])
     if "bounds" in settings:

@@ -15,10 +15,8 @@ class Requirements:
 
     opening : every design opens by itself: the state that is judged is the one that its assembly
         leads to along the way of `Design.stations`, without a snap
-    margin : no state comes closer to a snap than the input design's, see `margin_share`
     stress : the equivalent stress stays below the elastic limit in all states that a builder sees
     safety : factor by which the elastic limit is divided
-    margin_share : least eigenvalue of the softest mode, as a share of the input design's
     penalty : weight of a bound's excess (utilisation beyond 1), as a share of the fit's weight:
         at first 1 % of excess counts as much as a deviation of 1 % of the size at every joint
 
@@ -26,17 +24,15 @@ class Requirements:
     """
 
     opening: bool = True
-    margin: bool = True
     stress: bool = True
     safety: float = 1.0
-    margin_share: float = 0.2
     penalty: float = 0.01
 
     def __post_init__(self) -> None:
-        for name in ("opening", "margin", "stress"):
+        for name in ("opening", "stress"):
             if not isinstance(getattr(self, name), bool):
                 raise InputError("must be true or false", field=name, value=getattr(self, name))
-        for name in ("safety", "margin_share", "penalty"):
+        for name in ("safety", "penalty"):
             value = getattr(self, name)
             number = isinstance(value, (int, float)) and not isinstance(value, bool)
             if not (number and np.isfinite(value) and value > 0):
@@ -45,4 +41,4 @@ class Requirements:
     @classmethod
     def none(cls) -> Requirements:
         """Nothing is required: the baselines are made so."""
-        return cls(opening=False, margin=False, stress=False)
+        return cls(opening=False, stress=False)

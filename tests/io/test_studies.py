@@ -10,6 +10,7 @@ from kop_exudyn.errors import InputError
 from kop_exudyn.io.datasets import load_designs, select_files
 from kop_exudyn.io.studies import load_study
 from kop_exudyn.search.objective import Weights
+from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.settings import StageSettings
 
 HEAD = 'format = "kop_exudyn/study"\nversion = 1\n'
@@ -110,8 +111,11 @@ def test_the_schema_knows_all_settings(repository):
         (repository / "kop_exudyn" / "io" / "schemas" / "study.schema.json").read_text()
     )
     known = set(schema["properties"]["settings"]["properties"])
-    # which are written in Python
-    assert known == {field.name for field in fields(StageSettings)} - {"constraints"}
+    # constraints are written in Python, requirements have a table of their own
+    assert known == {f.name for f in fields(StageSettings)} - {"constraints", "requirements"}
+    assert set(schema["properties"]["requirements"]["properties"]) == {
+        field.name for field in fields(Requirements)
+    } - {"penalty"}
     assert set(schema["properties"]["weights"]["properties"]) == {
         field.name for field in fields(Weights)
     } - {"others"}
