@@ -22,6 +22,9 @@ _NEWTON = 12
 _AT_VERTEX = 1e-9
 # A spline slower than this, relative to its chord parameter, has a cusp.
 _CUSP = 1e-3
+# Points nearer to each other than this share of the length are meant to be one; a spline that turns
+# beside them by more than this (rad) has a hook that nobody drew.
+_NEARLY_THE_SAME, _HOOK = 1e-4, 0.5
 
 
 class Curve(ABC):
@@ -189,6 +192,7 @@ class Spline(Curve):
         self.length = float(self.stations[-1])
         d = self._dx(self._t)
         turns = _turn(d[:-1], d[1:])
+        self._refuse_hooks(np.diff(knots), np.abs(turns).reshape(-1, _PARTS).sum(axis=1))
         self._angles = np.arctan2(d[0, 1], d[0, 0]) + np.concatenate([[0.0], np.cumsum(turns)])
         if closed:
             self._lap_turning = float(
@@ -198,6 +202,19 @@ class Spline(Curve):
         # within a part
         sharpest = self._sharpest()
         self.sags = 0.25 * np.diff(self.stations) ** 2 * sharpest
+
+    def _refuse_hooks(self, steps: np.ndarray, turns: np.ndarray) -> None:
+        """Raise InputError where two points are nearly the same and the spline turns sharply there:
+        their direction is made of round-off, and it has to follow it."""
+        beside = np.maximum(turns, np.maximum(np.append(turns[1:], 0), np.append(0, turns[:-1])))
+        hooks = (steps < _NEARLY_THE_SAME * steps.sum()) & (beside > _HOOK)
+        if hooks.any():
+            k = int(np.argmax(hooks))
+            raise InputError(
+                f"is only {steps[k]:.3g} away from the point before, and the spline bends by "
+                f"{np.degrees(beside[k]):.0f} degrees there: leave one of the two out",
+                field=f"{self.field}[{k + 1}]",
+            )
 
     def _evaluate(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         t, part = self._parameter(s)

@@ -79,3 +79,15 @@ def test_layout_is_readable(tmp_path):
         '  "text": [\n    "x",\n    "y"\n  ],\n  "none": []\n}\n'
     )
     assert json.loads(path.read_text())["b"] == [1, 2.5]
+
+
+def test_an_archive_that_unpacks_to_very_much_is_not_read(tmp_path, monkeypatch):
+    import gzip
+
+    from kop_exudyn.files import json_files
+
+    monkeypatch.setattr(json_files, "SIZE_LIMIT", 10_000)
+    path = tmp_path / "design.json.gz"
+    path.write_bytes(gzip.compress(b"[" + b"0," * 100_000 + b"0]"))
+    with pytest.raises(InputError, match="larger than"):
+        json_files.read_json(path)

@@ -141,3 +141,14 @@ def test_a_polyline_that_folds_back():
 def test_unknown_kinds():
     with pytest.raises(InputError, match="unknown type"):
         curve_from_dict({"type": "nurbs", "points": [[0, 0], [1, 1]]}, "curves[0]")
+
+
+def test_points_that_nearly_are_the_same_would_make_a_hook():
+    """7 micrometres apart in 3 metres, in another direction than the curve's."""
+    x = np.linspace(0, 3, 15)
+    points = np.stack([x, 0.05 * np.sin(x)], axis=1)
+    hooked = np.insert(points, 8, points[7] + [-4e-6, 6e-6], axis=0)
+    with pytest.raises(InputError, match=r"points\[8\]: is only 7.21e-06 away .* leave one of"):
+        Spline(hooked)
+    along = np.insert(points, 8, points[7] + 1e-5 * (points[8] - points[7]), axis=0)
+    assert Spline(along).length == pytest.approx(Spline(points).length, rel=1e-6)

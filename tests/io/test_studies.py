@@ -205,3 +205,10 @@ def test_what_is_no_text(folder):
         load_study(path)
     with pytest.raises(InputError, match="no such file"):
         load_study(folder / "missing.toml")
+
+
+def test_a_number_of_thousands_of_digits(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text(f'format = "kop_exudyn/study"\nversion = 1\nseed = {"9" * 5000}\n')
+    with pytest.raises(InputError, match="study.toml: contains a number with too many digits"):
+        load_study(path)

@@ -11,6 +11,7 @@ import pytest
 from kop_exudyn.equilibrium.exudyn_confirm import confirm
 from kop_exudyn.errors import InputError
 from kop_exudyn.files.documents import check_schema
+from kop_exudyn.geometry.triangles import TriangleSurface
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.structures.fitting import TargetFitting
 from kop_exudyn.structures.strength import design_strength
@@ -131,3 +132,15 @@ def test_models_deploy_stably_near_their_target(repository, name):
     assert confirmation.residual < 1e-6
     strength = design_strength(design, {"deployed": state})["deployed"]
     assert np.isfinite(strength.limit).all() and 0.2 < strength.largest < 0.6
+
+
+@pytest.mark.parametrize("n", [1, 2, 30])
+def test_a_coarse_surface_keeps_the_faces_below_the_design(n):
+    """However large faces are: those that reach below the patch are its target."""
+    vertices, faces = height_field(lambda x, y: -(x**2 + y**2) / 2000, 900.0, n)
+    base = BaseMesh(*hexagon_patch(1, 30 + np.sqrt(3) * Plates().thickness))
+    data = design_on_surface("coarse", base, vertices, faces, plates=Plates())
+    target = TriangleSurface(data["target"]["vertices"], data["target"]["faces"])
+    apart = np.sqrt(target.closest(np.array(data["target"]["crossings"])).squared_distances)
+    assert apart.max() < 1e-2
+    assert np.abs(np.array(data["target"]["crossings"]).mean(axis=0)[:2]).max() < 30.0

@@ -23,6 +23,7 @@ from .layout import BaseMesh, Plates
 # The shortest published arms (32 mm on plates of 30 mm) belong to about this growth.
 LEAST_GROWTH = 4.0
 _MAX_ADJUSTMENTS = 60
+_FEWEST_FACES = 500
 _ON_SURFACE = 1e-9  # of the plane's size: round-off of points on its border
 
 
@@ -94,6 +95,7 @@ def design_on_surface(
 
     Raises InputError where the surface can't be flattened or the base mesh reaches beyond it.
     """
+    vertices, faces = _fine_enough(vertices, faces)
     flat = _Flattened(vertices, faces)
     c, s = np.cos(turn), np.sin(turn)
     points = (base.vertices - base.vertices.mean(axis=0)) @ np.array([[c, s], [-s, c]])
@@ -142,6 +144,17 @@ def design_on_surface(
             "plates": middles.round(3).tolist(),
         },
     }
+
+
+def _fine_enough(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same surface in more faces where it has few, so that one of its vertices is near to its
+    middle and the faces below the design can be told from others."""
+    from trimesh.remesh import subdivide
+
+    vertices, faces = np.asarray(vertices, float), np.asarray(faces)
+    while len(faces) < _FEWEST_FACES:
+        vertices, faces = subdivide(vertices, faces)
+    return vertices, faces
 
 
 def _patch(
