@@ -13,9 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from ..equilibrium.engines import FAST
+from ..equilibrium.engines import engine as solver_of
 from ..equilibrium.equilibria import Equilibrium
 from ..equilibrium.exudyn_confirm import Confirmation, confirm
-from ..equilibrium.newton import refine, solve
+from ..equilibrium.newton import refine
 from ..equilibrium.system import System
 from ..errors import InputError, SimulationFailure
 from ..scene.loads import DeadForces, Scaled, with_self_weight
@@ -77,9 +79,12 @@ class LoadedState:
         }
 
 
-def loaded_state(design: Design, unloaded: Equilibrium, case: LoadCase) -> LoadedState:
+def loaded_state(
+    design: Design, unloaded: Equilibrium, case: LoadCase, engine: str = FAST
+) -> LoadedState:
     """The state that the deployed design's equilibrium deforms into under a load case.
 
+    engine : what solves for it, see `simulate`
     Raises InputError where a density is missing or the supports don't hold the design,
     SimulationFailure when it finds no equilibrium under all of the load, or Exudyn doesn't confirm
     it.
@@ -88,16 +93,17 @@ def loaded_state(design: Design, unloaded: Equilibrium, case: LoadCase) -> Loade
     role = design.fitted_role.name
     supports = supports_of(design, unloaded, case)
     held = _held(design.scene(role), unloaded, design.joints[supports])
-    found, scene = unloaded, held
+    found, scene, solve = unloaded, held, solver_of(engine)
     for share in np.linspace(0, 1, _STEPS + 1)[1:]:
         scene = _loaded(design, held, unloaded, case, share)
         try:
             found = solve(system := System(scene), unloaded.q, found, unloaded.opening)
         except SimulationFailure as failure:
             raise failure.within(f"{design.name}: under {share:.0%} of its loads") from None
-    found = refine(system, found)
+    if engine == FAST:
+        found = refine(system, found)
     try:
-        confirmation = confirm(scene, found)
+        confirmation = confirm(scene, found, unloaded.q, unloaded.opening)
     except SimulationFailure as failure:
         raise failure.within(f"{design.name}: under its loads") from None
     found = replace(found, state=confirmation.state)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from ..compiled.library import library
+from ..equilibrium.engines import FAST
+from ..equilibrium.engines import engine as solver_of
 from ..equilibrium.equilibria import Equilibrium
 from ..equilibrium.exudyn_confirm import Confirmation, confirm
 from ..equilibrium.newton import refine
@@ -40,6 +42,7 @@ class SimulationResult:
     fit : of the deployed joints to the target
     joints : (n, 3) positions
     loaded : the deployed state under the design's loads, where it has any
+    engine : what solved for the states
     """
 
     design: Design
@@ -52,6 +55,7 @@ class SimulationResult:
     fit: FitResult
     joints: np.ndarray
     loaded: LoadedState | None = None
+    engine: str = FAST
 
     @property
     def deployed(self) -> Equilibrium:
@@ -84,6 +88,7 @@ class SimulationResult:
             "units": None if self.design.units is None else self.design.units.to_dict(),
             "unknowns": self.unknowns,
             "elements": self.elements,
+            "engine": self.engine,
             "newton_iterations": self.newton_iterations,
             "wall_s": self.wall_s,
             "elastic_energy": final.elastic_energy,
@@ -119,24 +124,38 @@ class SimulationResult:
         }
 
 
-def simulate(design: Design, loads: LoadCase | None = None) -> SimulationResult:
+def simulate(design: Design, loads: LoadCase | None = None, engine: str = FAST) -> SimulationResult:
     """Deploy a design and have Exudyn confirm its states, the one under loads included.
 
-    loads : default: the design's own Raises SimulationFailure when a state isn't found, is
-    unstable, or isn't confirmed, InputError for loads that the design can't have (see
-    `loaded_state`).
+    Parameters
+    ----------
+    loads : default: the design's own
+    engine : what solves for the states: "fast", this package's solver, or "exudyn", Exudyn from
+        the same starts (see `equilibrium.exudyn_solver`), which takes longer. Target surfaces of
+        C-shells, which are made by a simulation of their smooth design, are the fast solver's
+
+    Raises
+    ------
+    SimulationFailure
+        a state isn't found, is unstable, or isn't confirmed
+    InputError
+        an unknown engine, or loads that the design can't have (see `loaded_state`)
     """
     loads = design.loads if loads is None else loads
+    solve = solver_of(engine)
     library()  # compiled now, where it has to be
     begin = perf_counter()
     try:
-        equilibria = dict(design.deploy())
+        equilibria = dict(design.deploy() if engine == FAST else design.deploy(solve=solve))
         wall_s = perf_counter() - begin
         target = design.target
         confirmations = {}
-        for name, equilibrium in equilibria.items():
-            equilibria[name] = refine(design.systems[name], equilibrium)
-            confirmations[name] = confirm(design.scene(name), equilibria[name])
+        for role in design.roles:
+            name, found = role.name, equilibria[role.name]
+            if engine == FAST:
+                found = refine(design.systems[name], found)
+            confirmations[name] = confirm(design.scene(name), found, opening=role.opening)
+            equilibria[name] = replace(found, state=confirmations[name].state)
     except SimulationFailure as failure:
         doubts = "".join(f"; {doubt}" for doubt in design_doubts(design))
         raise SimulationFailure(failure.reason + doubts, where=failure.where).within(
@@ -144,11 +163,11 @@ def simulate(design: Design, loads: LoadCase | None = None) -> SimulationResult:
         ) from None
     for doubt in design_doubts(design):
         log.warning("%s: %s", design.name, doubt)
-    role = design.fitted_role.name
-    joints = design.report_positions(confirmations[role].state)
-    fit = TargetFitting(target)(confirmations[role].state.positions[design.joints])
-    system = design.systems[role]
-    loaded = None if loads.empty else loaded_state(design, equilibria[role], loads)
+    fitted = design.fitted_role.name
+    joints = design.report_positions(confirmations[fitted].state)
+    fit = TargetFitting(target)(confirmations[fitted].state.positions[design.joints])
+    system = design.systems[fitted]
+    loaded = None if loads.empty else loaded_state(design, equilibria[fitted], loads, engine)
     result = SimulationResult(
         design,
         system.n_unknowns,
@@ -160,6 +179,7 @@ def simulate(design: Design, loads: LoadCase | None = None) -> SimulationResult:
         fit,
         joints,
         loaded,
+        engine,
     )
     if result.displaced_percent > max(_FAR_AWAY, _SLID * fit.max_percent):
         log.warning(

@@ -26,7 +26,8 @@ EXAMPLES = """examples:
   kop simulate models/conformals/01_sinh.json
   kop simulate design.json --json > state.json
   kop simulate models/grids/01_dome.json --gravity
-  kop simulate design.json --gravity=0,0,-9810"""
+  kop simulate design.json --gravity=0,0,-9810
+  kop simulate models/umbrellas/hill.json --engine exudyn"""
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,6 +43,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="let the rods' weight act: an acceleration down the z axis (default: standard "
         "gravity, where the design names its units) or a vector X,Y,Z, in the design's units; "
         "instead of the design file's gravity. Materials need a density",
+    )
+    parser.add_argument(
+        "--engine",
+        choices=("fast", "exudyn"),
+        default="fast",
+        help="what solves for the states: this package's solver, whose states Exudyn confirms, or "
+        "Exudyn itself, from the same starts, which takes many times as long (default: "
+        "%(default)s)",
     )
     add_json(
         parser,
@@ -63,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     if args.gravity is not None:
         own = (replace(design.loads, gravity=_gravity(design, args)),)
     try:
-        result = simulate(design, *own).to_dict()
+        result = simulate(design, *own, engine=args.engine).to_dict()
     except SimulationFailure as failure:
         if args.json:
             sys.stdout.write(to_json({"design": design.name, "failed": str(failure)}))
@@ -103,7 +112,8 @@ def _summary(result: dict, units: Units | None) -> str:
         "displacement": f"max {result['displaced_percent']:.3g} % from the joints' own places",
         "elastic energy": with_unit(result["elastic_energy"], "energy", units, 6),
         "stable": "yes" if result["stable"] else "no",
-        "solved in": f"{result['wall_s']:.2f} s, {result['newton_iterations']} Newton iterations",
+        "solved in": f"{result['wall_s']:.2f} s, {result['newton_iterations']} Newton iterations"
+        + (" by Exudyn" if result["engine"] == "exudyn" else ""),
         "Exudyn": f"{exudyn['version']}: {exudyn['newton_steps']} steps, "
         f"moved by {exudyn['moved']:.1e} of its size",
     }
