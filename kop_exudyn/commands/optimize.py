@@ -133,6 +133,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "better kits and take longer (default: 3)",
     )
     parser.add_argument(
+        "--effort",
+        choices=("quick", "normal", "thorough"),
+        help="from how many starts the parts are optimised (default: normal, the best two of a "
+        "dozen; quick: that of the relaxed stage alone; thorough: the best five of many)",
+    )
+    parser.add_argument(
         "--redeployments",
         type=not_negative,
         metavar="N",
@@ -306,7 +312,13 @@ def _smallest(args: argparse.Namespace, study: Study, parts: dict[str, int]) -> 
 def _given(args: argparse.Namespace) -> dict[str, Any]:
     """The stages' settings that options give."""
     steps = dict.fromkeys(("relaxed_steps", "assigned_steps", "round_steps"), args.max_steps)
-    given = {"seed": args.seed, "leaps": args.leaps, "redeployments": args.redeployments, **steps}
+    given = {
+        "effort": args.effort,
+        "seed": args.seed,
+        "leaps": args.leaps,
+        "redeployments": args.redeployments,
+        **steps,
+    }
     return {name: value for name, value in given.items() if value is not None}
 
 

@@ -13,6 +13,7 @@ from ..kit.kinds import part_kind
 from ..kit.optimality import ClusteringGap
 from ..search.objective import Evaluation
 from ..search.result import INPUT, REDEPLOYED, STAGES, KitResult
+from ..search.starts import TriedStart
 from ..structures.base import Design
 from ..units import unit_of
 from .designs import DrawnDesign, DrawnState
@@ -191,11 +192,25 @@ def remarks(result: KitResult) -> list[str]:
     ]
     found += [_about_clustering(kind, gap) for kind, gap in result.clustering.items()]
     found = [remark for remark in found if remark]
+    if len(result.tried) > 1:
+        found.append(_about_starts(result.tried))
     return found + [
         f"The {name} stage ended after {stage.steps} steps: {stage.status}."
         for name, stage in stages.items()
         if stage.status
     ]
+
+
+def _about_starts(tried: Sequence[TriedStart]) -> str:
+    """From how many starts the assigned stage ran, and which one was kept."""
+    ends = [start.optimised for start in tried if start.optimised is not None]
+    kept = next(start for start in tried if start.kept)
+    origin = "that of the relaxed stage" if kept.origin == "relaxed" else "found under the model"
+    others = ", ".join(f"{end:.4g}" for end in sorted(ends))
+    return (
+        f"{len(tried)} starts of the assigned stage were built, the best {len(ends)} optimised "
+        f"(J = {others}); the one kept is {origin}."
+    )
 
 
 def _about_clustering(kind: str, gap: ClusteringGap) -> str:

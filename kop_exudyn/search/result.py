@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,7 @@ from ..units import Units, common_units
 from .events import events_to_list
 from .objective import Evaluation, Reference
 from .stage_results import SAME_STATE, StageEvent, StageResult, distance
+from .starts import TriedStart
 
 INPUT = "input"  # the designs as given, before all stages
 REDEPLOYED = "redeployed"  # the assigned designs, opened from their assembly
@@ -39,6 +40,7 @@ class KitResult:
         (`Evaluation.utilisation`); empty where it wasn't computed
     clustering : by kind, how far the parts that the search began with are from the best clustering
         of the input elements
+    tried : starts of the assigned stage, and what came of them
     equilibria, newton_iterations : solved in all
     settings : as given, for the record
     """
@@ -55,6 +57,7 @@ class KitResult:
     settings: Mapping[str, Any] = field(default_factory=dict)
     redeployed: Sequence[Evaluation | SimulationFailure] = ()
     clustering: Mapping[str, ClusteringGap] = field(default_factory=dict)
+    tried: Sequence[TriedStart] = ()
 
     @property
     def units(self) -> Units | None:
@@ -137,6 +140,7 @@ class KitResult:
             "kit": {kind: _plain(parts) for kind, parts in self.kit.parts.items()},
             "assignment": self.assignment.to_dict(),
             "clustering": {kind: gap.to_dict() for kind, gap in self.clustering.items()},
+            "tried": [asdict(start) for start in self.tried],
             "steps": {
                 stage: self.stages[stage].steps
                 for stage in ("relaxed", "assigned", "unrelaxed")

@@ -18,16 +18,17 @@ from ..kit.parts import Kit
 from ..kit.stock import Missing, Stock
 from ..structures.base import Design
 from ..units import common_units
-from .assigned import assigned_stage, opened_stage
+from .assigned import opened_stage
 from .dataset import Dataset
 from .neighbours import resized
-from .objective import Weights
+from .objective import Evaluation, Weights
 from .pool import DesignPool
 from .requirements import Requirements
 from .result import KitResult
 from .settings import JobSettings
 from .stage_results import StageEvent, StageResult
 from .stages import Observer, Stages, Store
+from .starts import assigned_from_starts
 
 
 def optimize_kit(
@@ -102,7 +103,10 @@ def optimize_kit(
             announce("path to the parts")
             found["relaxed"], result.at_parts = stages.to_parts(relaxed)
         announce("assigned stage")
-        found["assigned"] = assigned_stage(stages, result.at_parts)
+        bases = []
+        if "relaxed" in found and all(isinstance(d, Evaluation) for d in found["relaxed"].designs):
+            bases = [stages.inputs(), found["relaxed"].evaluations]
+        found["assigned"], result.tried = assigned_from_starts(stages, result.at_parts, bases)
         announce("deployment of the assigned designs")
         found["assigned"] = opened_stage(stages, found["assigned"])
         result.redeployed = stages.redeployed(found["assigned"])

@@ -4,10 +4,34 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..errors import InputError
 from ..kit.kinds import Bounds
 from ..sqp.constraints import LinearConstraints
 from .objective import Weights
 from .requirements import Requirements
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is tried, see starts.py.
+
+    clusterings : seeds that the search under each model begins with; 0: no such search
+    shakes : of each
+    built : kits of each model from which the designs are built
+    optimised : starts, that of the relaxed stage among them, from which the assigned stage runs
+    """
+
+    clusterings: int
+    shakes: int
+    built: int
+    optimised: int
+
+
+EFFORTS = {
+    "quick": Effort(0, 0, 0, 1),
+    "normal": Effort(3, 5, 2, 2),
+    "thorough": Effort(8, 20, 4, 5),
+}
 
 
 @dataclass(frozen=True)
@@ -39,6 +63,8 @@ class StageSettings:
     constraints : on the elements of all designs, see `on_elements`; the baselines "direct" and
         "unrelaxed" keep to them as far as their parts can
     hessian : "exact" or "bfgs"
+    effort : "quick", "normal" or "thorough": from how many starts the assigned stage runs, see
+        starts.py
     requirements : that the kit's designs have to meet, see there; not those of the baselines
     """
 
@@ -63,6 +89,14 @@ class StageSettings:
     bounds: Bounds | None = None
     constraints: LinearConstraints | None = None
     hessian: str = "exact"
+    effort: str = "normal"
+
+    def __post_init__(self) -> None:
+        if self.effort not in EFFORTS:
+            raise InputError(
+                f"unknown (known: {', '.join(EFFORTS)})", field="effort", value=self.effort
+            )
+
     requirements: Requirements = Requirements()
 
 

@@ -1,4 +1,4 @@
-"""Starts for the assigned stage, found under a quadratic model of the objective alone.
+"""Several starts for the assigned stage, most of them found under a quadratic model alone.
 
 Clustering sees an element by its distance to a part. The designs' objective, however, hardly
 changes along most directions, and a kit that follows these is better than the nearest one. Under a
@@ -11,16 +11,19 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import count
 
 import numpy as np
 
 from ..kit.cluster import cluster
 from ..kit.kinds import part_kind
 from ..kit.parts import Assignment, Kit
+from .assigned import assigned_stage
 from .objective import Evaluation
 from .problems import AssignedProblem
 from .reassign import LocalModel, Reassignment, improved
+from .settings import EFFORTS, Effort
 from .stage_results import StageResult
 from .stages import Stages
 
@@ -28,25 +31,61 @@ log = logging.getLogger(__name__)
 
 _DAMPINGS = (1e-3, 1e-5)  # of the models
 _SHAKEN = 0.05  # of the elements get any other part, at least two
+_NUMBERS = 100  # of rounds, at most, of each start: every SQP has a name of its own
 _SAME = 1e-6  # relative; starts whose predictions are that close are one
 
 
 @dataclass(frozen=True)
-class StartOptions:
-    """How many starts are looked for.
+class TriedStart:
+    """One start of the assigned stage.
 
-    clusterings : seeds that each model's search begins with
-    shakes : of each
-    built : starts of each model that are built
+    origin : "relaxed", or "model" for one that was found under a quadratic model
+    built : J of the designs built of its kit, None where one failed
+    optimised : J after the assigned stage; None where that didn't run or a design failed
+    kept : whether it is the result
     """
 
-    clusterings: int = 6
-    shakes: int = 20
-    built: int = 3
+    origin: str
+    built: float | None
+    optimised: float | None = None
+    kept: bool = False
+
+
+def assigned_from_starts(
+    stages: Stages, built: StageResult, bases: Sequence[Sequence[Evaluation]]
+) -> tuple[StageResult, list[TriedStart]]:
+    """The best of assigned stages from several starts, and what was tried.
+
+    built : the relaxed designs at their parts, which is always a start
+    bases : evaluations of all designs at which the objective is modelled, one list a base
+
+    Effort says how many starts are looked for (`StageSettings.effort`). The start of the relaxed
+    stage is one of them; they are optimised in the order of J.
+    """
+    effort = EFFORTS[stages.settings.effort]
+    found = []
+    if effort.clusterings and stages.rule.parts_move:
+        found = model_starts(stages, bases, effort)
+    starts = [("relaxed", built), *(("model", start) for start in found)]
+    tried = [TriedStart(origin, start.value) for origin, start in starts]
+    order = sorted(range(len(starts)), key=lambda n: _value(starts[n][1]))[: effort.optimised]
+    best, which = built, 0
+    for k, n in enumerate(order or [0]):
+        start = starts[n][1] if starts[n][0] == "relaxed" else stages.confirmed(starts[n][1])
+        numbers = None if k == 0 else count(1 + _NUMBERS * k)
+        end = assigned_stage(stages, start, numbers)
+        tried[n] = replace(tried[n], optimised=end.value)
+        log.info(
+            "start %d (%s) ends at J = %s, from %s", k + 1, starts[n][0], end.value, start.value
+        )
+        if k == 0 or _value(end) < _value(best):
+            best, which = end, n
+    tried[which] = replace(tried[which], kept=True)
+    return replace(best, jumps=built.jumps), tried
 
 
 def model_starts(
-    stages: Stages, bases: Sequence[Sequence[Evaluation]], options: StartOptions
+    stages: Stages, bases: Sequence[Sequence[Evaluation]], options: Effort
 ) -> list[StageResult]:
     """Designs built of kits that quadratic models at the bases prefer; not confirmed yet, in the
     order of J. Those of which a design failed are left out.
@@ -80,7 +119,7 @@ def model_starts(
     return sorted(whole, key=lambda built: built.value or 0.0)
 
 
-def _best_under(stages: Stages, model: LocalModel, options: StartOptions) -> list[Reassignment]:
+def _best_under(stages: Stages, model: LocalModel, options: Effort) -> list[Reassignment]:
     """The best kits under one model that differ, by iterated local search from some clusterings."""
     settings, dataset = stages.settings, stages.dataset
     q = np.concatenate(model.base)
@@ -120,6 +159,10 @@ def _improved(
         stages.dataset, kit, assignment, stages.settings.bounds, stages.settings.constraints
     )
     return improved(problem, model)
+
+
+def _value(result: StageResult) -> float:
+    return np.inf if result.value is None else result.value
 
 
 def _shaken(assignment: Assignment, kit: Kit, rng: np.random.Generator) -> Assignment:

@@ -186,10 +186,9 @@ def test_a_stock_of_60_percent_of_another_kits_pieces(another_kit, tmp_path):
         assert all(np.all(used[kind] <= counts[kind]) for kind in counts)
         assert used["linear"].sum() == 4 and used["angular"].sum() == 3
         assert result.stages["assigned"].designs[n].confirmations
-    # scarce pieces cost something, and moving the designs to them gains something
+    # there are fewer pieces than the nearest parts would take, and moving the designs to them gains
     free = optimize_kit(zigzags(), kit=kit, settings=SETTINGS)
     assert any(np.any(u[k] > counts[k]) for u in free.pieces() for k in counts)
-    assert free.stages["assigned"].value < result.stages["assigned"].value
     assert result.stages["assigned"].value < result.stages["direct"].value
     page = (out / "index.html").read_text(encoding="utf-8")
     assert "<h1>A stock for 2 designs</h1>" in page and "one after the other" in page

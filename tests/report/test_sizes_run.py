@@ -13,7 +13,7 @@ from kop_exudyn.io.results import load_result
 from kop_exudyn.report.sizes_run import smallest_and_report, tradeoff_and_report
 from kop_exudyn.search.settings import JobSettings, StageSettings
 
-STAGES = StageSettings(schedule=(1e3, 1e5), path_steps=4, leaps=0, reassignments=1)
+STAGES = StageSettings(schedule=(1e3, 1e5), path_steps=4, leaps=0, reassignments=1, effort="quick")
 SETTINGS = JobSettings(jobs=1, stages=STAGES, baselines=False)
 SIZES = [{"linear": n, "angular": 2} for n in (2, 4)]
 
