@@ -88,7 +88,7 @@ def optimize_kit(
         found = result.stages
         if isinstance(start, StageResult):
             announce("splitting and merging parts")
-            found["built"] = stages.confirmed(resized(stages, start, dict(parts or {})))
+            result.at_parts = stages.confirmed(resized(stages, start, dict(parts or {})))
         elif start is not None:
             announce("path from the neighbouring kit")
             result.at_parts = stages.from_neighbour(np.concatenate(list(start)))

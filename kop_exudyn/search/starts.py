@@ -31,6 +31,7 @@ log = logging.getLogger(__name__)
 
 _DAMPINGS = (1e-3, 1e-5)  # of the models
 _SHAKEN = 0.05  # of the elements get any other part, at least two
+_PROMISING = 1.5  # times the lowest J built; starts above that rarely end lower
 _NUMBERS = 100  # of rounds, at most, of each start: every SQP has a name of its own
 _SAME = 1e-6  # relative; starts whose predictions are that close are one
 
@@ -60,7 +61,7 @@ def assigned_from_starts(
     bases : evaluations of all designs at which the objective is modelled, one list a base
 
     Effort says how many starts are looked for (`StageSettings.effort`). The start of the relaxed
-    stage is one of them; they are optimised in the order of J.
+    stage is one of them; they are optimised in the order of J, unless J is far above the lowest.
     """
     effort = EFFORTS[stages.settings.effort]
     found = []
@@ -68,9 +69,11 @@ def assigned_from_starts(
         found = model_starts(stages, bases, effort)
     starts = [("relaxed", built), *(("model", start) for start in found)]
     tried = [TriedStart(origin, start.value) for origin, start in starts]
-    order = sorted(range(len(starts)), key=lambda n: _value(starts[n][1]))[: effort.optimised]
+    limit = _PROMISING * min(_value(start) for _, start in starts)
+    promising = [n for n in range(len(starts)) if n == 0 or _value(starts[n][1]) <= limit]
+    order = sorted(promising, key=lambda n: _value(starts[n][1]))[: effort.optimised]
     best, which = built, 0
-    for k, n in enumerate(order or [0]):
+    for k, n in enumerate(order):
         start = starts[n][1] if starts[n][0] == "relaxed" else stages.confirmed(starts[n][1])
         numbers = None if k == 0 else count(1 + _NUMBERS * k)
         end = assigned_stage(stages, start, numbers)
