@@ -23,6 +23,7 @@ ANSWER = {
     "design": "arch",
     "unknowns": 120,
     "elements": 20,
+    "engine": "fast",
     "newton_iterations": 12,
     "wall_s": 0.5,
     "elastic_energy": 1.25,
@@ -81,7 +82,7 @@ def simulated(monkeypatch):
     """Replaces the simulation by a known answer, or by an error put into the dict."""
     outcome = {}
 
-    def simulate(design):
+    def simulate(design, engine):
         if "error" in outcome:
             raise outcome["error"]
         return SimpleNamespace(to_dict=lambda: ANSWER)
