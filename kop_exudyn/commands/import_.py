@@ -234,8 +234,7 @@ def _drawing(args: argparse.Namespace, wanted: str) -> int:
     if args.out is not None:
         _require(args, wanted, *(["opening"] * (wanted == "c_shell")), "section", "material")
     units = None if args.unit is None else Units(args.unit, args.force_unit)
-    in_space = wanted == "grid"
-    drawn, units = read_scaled(args.file, _reading(args), args.scale, units, space=in_space)
+    drawn, units = read_scaled(args.file, _reading(args), args.scale, units, space=True)
     if units is not None:
         units = Units(units.length, args.force_unit)
     try:

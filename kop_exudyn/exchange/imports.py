@@ -19,7 +19,8 @@ from .curve_files import read_drawing
 from .design_data import Rods, c_shell_data, grid_data, mesh_target, rod_doubts
 from .drawing import Drawing, Finding
 from .drawn_networks import DrawnNetwork, ReadingOptions, drawn_network
-from .space_nets import surface_through, with_heights_checked
+from .frames import Frame
+from .space_nets import laid_flat, surface_through, with_heights_checked
 
 _ON_SURFACE = 0.01  # of a mesh's size: curves drawn in space on it may be that far off
 
@@ -78,17 +79,19 @@ def read_scaled(
 def import_c_shell(
     drawn: DrawnNetwork, name: str, rods: Rods, opening: float, out: Path, target: Path | None
 ) -> Imported:
-    """A C-shell of a flat net.
+    """A C-shell of a net that is flat, or can be laid flat.
 
     opening : rad
     out : where the design will be written; target : mesh to keep to, in the drawing's coordinates
 
     Raises InputError, naming the drawing's curves, where no design comes of it.
     """
+    frame = replace(drawn.frame, origin=drawn.frame.origin + drawn.origin)
+    if not drawn.frame.flat:
+        drawn, frame = laid_flat(drawn), Frame(drawn.origin, np.eye(3), 0.0)
     findings = drawn.findings + _doubts(drawn, rods)
     goal = None
     if target is not None:
-        frame = replace(drawn.frame, origin=drawn.frame.origin + drawn.origin)
         goal = mesh_target(relative(target, out), frame, drawn.options.scale)
     free = drawn.options.free_ends
     data = c_shell_data(name, drawn.entries, rods, opening, free_ends=free, target=goal)
@@ -133,7 +136,12 @@ def import_grid(
         where = {"type": "mesh", "file": relative(surface, out)}
         where |= {"scale": scale} if scale != 1.0 else {}
         where |= {"chart": chart} if chart != "plane" else {}
-        mesh = load_mesh_surface(surface, chart, "z", scale, scale * drawn.origin)
+        try:
+            mesh = load_mesh_surface(surface, chart, "z", scale, scale * drawn.origin)
+        except InputError as error:
+            if error.field != "surface.file":
+                raise
+            raise InputError(error.message, source=surface) from None
         if chart == "conformal":
             drawn = replace(drawn, entries=_in_chart(drawn, mesh))
     findings = drawn.findings + _doubts(drawn, rods)
@@ -178,7 +186,7 @@ def _check(
         for field in ("surface", "target"):  # files of their own
             if named.field == f"{field}.file" and "file" in data.get(field, {}):
                 file = out.parent / data[field]["file"]
-                raise InputError(named.message, source=os.path.relpath(file)) from None
+                raise InputError(named.message, source=os.path.normpath(file)) from None
         raise InputError(named.message, field=named.field, value=named.value) from None
 
 

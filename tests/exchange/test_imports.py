@@ -281,3 +281,42 @@ def test_nets_far_away_are_designs_near_the_origin_and_files_give_the_place_back
             for name in ("near", "far")
         )
         np.testing.assert_allclose(there - far, near, atol=1e-3)
+
+
+class TestLaidFlat:
+    """C-shells are made of flat nets; what is drawn on a developable surface can be unrolled."""
+
+    @staticmethod
+    def net(path, shape, n=4):
+        """n by n lines of parameters (u, v), one apart, on a surface."""
+        t, text = np.linspace(-0.15, n - 0.85, 25), []
+        for k in range(n):
+            for u, v in ((t, np.full(25, float(k))), (np.full(25, float(k)), t)):
+                text += [f"v {x!r} {y!r} {z!r}" for x, y, z in np.stack(shape(u, v), 1).tolist()]
+                text.append("l " + " ".join(str(m) for m in range(-25, 0)))
+        path.write_text("\n".join([*text, ""]))
+        return path
+
+    @pytest.mark.parametrize("radius", [2.5, 10.0])
+    def test_a_cylinder(self, radius, tmp_path, capsys):
+        path = self.net(
+            tmp_path / "net.obj",
+            lambda u, v: (radius * np.sin(u / radius), v, radius * np.cos(u / radius)),
+        )
+        out = tmp_path / "net.json"
+        status, told, _ = imported(capsys, path, "--out", out, *SHELL)
+        assert status == 0 and "drawn in space and laid flat" in told
+        design = load_design(out)
+        assert design.network.n_joints == 16
+        spans = np.concatenate([strand.lengths for strand in design.network.strands])
+        np.testing.assert_allclose(spans, 1.0, rtol=5e-3)
+        np.testing.assert_allclose(design.network.opening_angles, np.pi / 2, atol=0.01)
+
+    def test_a_dome_cannot_be(self, tmp_path, capsys):
+        path = self.net(
+            tmp_path / "net.obj", lambda u, v: (u, v, -0.1 * ((u - 1.5) ** 2 + (v - 1.5) ** 2))
+        )
+        out = tmp_path / "net.json"
+        status, _, error = imported(capsys, path, "--out", out, *SHELL)
+        assert status == 2 and "can't be laid flat: lengths would change by up to" in error
+        assert not out.exists()
