@@ -231,7 +231,7 @@ class System:
             force, moment, stretch = self.rods.largest_forces(self.lengths)
             self._forces = (
                 float(np.maximum(force, moment / scene.length_scale)),
-                float(np.finfo(float).eps * scene.size * stretch),
+                float(np.finfo(float).eps * scene.reach * stretch),
             )
         return self._forces
 

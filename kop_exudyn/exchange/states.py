@@ -38,7 +38,7 @@ class DesignState:
     scene, equilibrium : what was solved
     parts, elements : by rod piece, the part's label ("" without one) and the element's number (0)
     colours (n_chains, 3) : sRGB by rod piece
-    placement : where files have it
+    placement : where it fits its target, both seen from `design.origin`
     target : the surface that it is compared with; None for states that aren't
     """
 

@@ -17,7 +17,7 @@ import scipy.sparse as sp
 
 from ..errors import InputError
 from .mesh_files import read_mesh
-from .surfaces import Surface
+from .surfaces import PLAN_AXES, Surface
 from .triangles import TriangleSurface, barycentric
 
 _DEGREE = 3
@@ -25,7 +25,6 @@ _MIN_CELLS, _MAX_CELLS = 4, 40
 _VERTICES_A_CELL = 4.0
 _PENALTY = 1e-5  # of the mean data weight of a coefficient
 _MAX_DEVIATION = 0.01  # of the bounding box's diagonal
-_AXES = {"x": (1, 2, 0), "y": (2, 0, 1), "z": (0, 1, 2)}
 
 
 class MeshSurface(Surface):
@@ -47,7 +46,7 @@ class MeshSurface(Surface):
                 self.mesh.vertices[used], np.searchsorted(used, self.mesh.faces)
             )
         flat = (
-            _conformal(self.mesh) if chart == "conformal" else self.mesh.vertices[:, _AXES[up][:2]]
+            _conformal(self.mesh) if chart == "conformal" else self.mesh.vertices[:, PLAN_AXES[up]]
         )
         area = _signed_areas(flat, self.mesh.faces)
         if not ((area > 0).all() or (area < 0).all()):
@@ -107,7 +106,8 @@ class MeshSurface(Surface):
         from scipy.sparse.linalg import spsolve
 
         cells = np.sqrt(len(flat) / _VERTICES_A_CELL * extent / extent[::-1])
-        cells = np.clip(np.round(cells), _MIN_CELLS, _MAX_CELLS).astype(int)
+        # halves go down, on whichever side of them rounding leaves a mesh that is moved
+        cells = np.clip(np.ceil(cells - 0.5 - 1e-6), _MIN_CELLS, _MAX_CELLS).astype(int)
         knots = [
             np.linspace(low - _DEGREE * step, high + _DEGREE * step, n + 2 * _DEGREE + 1)
             for low, high, n, step in zip(self.lower, self.upper, cells, extent / cells)

@@ -23,6 +23,8 @@ from .jets import Jet, constant, cos, cosh, exp, log, sin, sinh, tanh, variables
 # x_u and x_v that span less than this share of |x_u| |x_v|, or are that much smaller than
 # elsewhere, span no plane.
 _DEGENERATE = 1e-9
+# Coordinates that a surface over a plane has as parameters, by the axis that points up.
+PLAN_AXES = {"x": [1, 2], "y": [2, 0], "z": [0, 1]}
 
 
 @dataclass(frozen=True)

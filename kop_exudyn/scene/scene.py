@@ -151,6 +151,13 @@ class Scene:
         """Bounding-box diagonal of the initial nodes."""
         return float(np.linalg.norm(np.ptp(self.node_poses(self.initial)[0], axis=0)))
 
+    @cached_property
+    def reach(self) -> float:
+        """Largest distance that tells how finely coordinates are resolved: the size, or of scenes
+        away from the origin their largest coordinate."""
+        x = self.node_poses(self.initial)[0]
+        return max(self.size, float(np.abs(x).max(initial=0.0)))
+
     def rest_lengths(self, q: np.ndarray) -> np.ndarray:
         """Rest lengths (E,) at q (n_parameters,). Raises SimulationFailure unless all are
         positive."""

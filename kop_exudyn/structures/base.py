@@ -98,7 +98,10 @@ class Design(ABC):
     loads: LoadCase = LoadCase()
     # Of all its numbers; None where its file names none.
     units: Units | None = None
-    # (3,) where the origin of the design's coordinates lies in those of its user's other files.
+    # (3,) where the scenes' coordinates begin in those of the design's own file: zero, unless it
+    # lies far from the origin (see `geometry.centring`).
+    middle: np.ndarray = np.zeros(3)
+    # (3,) where they begin in those of its user's other files.
     # Numbers here stay small; what is written for other programs has it added.
     origin: np.ndarray = np.zeros(3)
     name: str
@@ -133,8 +136,9 @@ class Design(ABC):
         kept."""
 
     def report_positions(self, state: State) -> np.ndarray:
-        """Joint positions (n, 3) in the order and the units of the design's own file."""
-        return state.positions[self.joints]
+        """Joint positions (n, 3) in the order, the units and the place of the design's own
+        file."""
+        return self.middle + state.positions[self.joints]
 
     @property
     def hardware(self) -> CellHardware | None:
@@ -266,15 +270,51 @@ def design_from_dict(data: Mapping[str, Any], source: str = "design") -> Design:
             field="class",
             value=class_name,
         )
-    design = reader(data, source)
+    try:
+        near, middle = centred(data)
+    except InputError as error:
+        raise error.at(source) from None
+    design = reader(near, source)
+    if middle.any():
+        design.middle = middle
     if "units" in data:
         design.units = units_from_dict(data["units"])
-    if "origin" in data:
-        design.origin = np.array(data["origin"], float)
+    design.origin = design.middle + np.array(data.get("origin", (0.0, 0.0, 0.0)), float)
     if "loads" in data or "supports" in data:
         design.loads = load_case_from_dict(data)
         design.loads.check(len(design.joints), source)
     return design
+
+
+Centring = Callable[[Mapping[str, Any]], tuple[Mapping[str, Any], np.ndarray]]
+_CENTRINGS: dict[str, Centring] = {}
+
+
+def register_centring(class_name: str) -> Callable[[Centring], Centring]:
+    """Decorator: the function that gives a design file's content seen from its own middle, and
+    that middle (3,): see `geometry.centring`. Files of classes without one are read as they
+    are."""
+
+    def add(centring: Centring) -> Centring:
+        _CENTRINGS[class_name] = centring
+        return centring
+
+    return add
+
+
+def centred(data: Mapping[str, Any]) -> tuple[Mapping[str, Any], np.ndarray]:
+    """A design file's content around the origin, and where its own coordinates have that place
+    (3,), zero for designs that lie near the origin anyway. Raises InputError for such as lie too
+    far away."""
+    centring = _CENTRINGS.get(data["class"])  # read by now
+    if centring is None:
+        return data, np.zeros(3)
+    try:
+        return centring(data)
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+        if isinstance(error, InputError):
+            raise
+        return data, np.zeros(3)  # a field is missing or wrong: what reads it says so
 
 
 Rescaling = Callable[[Mapping[str, Any], float], dict[str, Any]]

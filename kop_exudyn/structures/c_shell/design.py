@@ -26,13 +26,22 @@ from ...equilibrium.newton import NewtonOptions
 from ...equilibrium.newton import solve as fast
 from ...equilibrium.system import System
 from ...errors import InputError, SimulationFailure
+from ...geometry.centring import middle_of, moved
 from ...geometry.linkage import refuse_loose_parts
 from ...geometry.network import CurveNetwork, network_from_dict
 from ...geometry.network_faces import triangulate
 from ...geometry.triangles import TriangleSurface
 from ...rods.sections import material_from_dict, section_from_dict
 from ...scene.scene import Scene
-from ..base import Design, Role, Solve, Target, register_class, register_rescaling
+from ..base import (
+    Design,
+    Role,
+    Solve,
+    Target,
+    register_centring,
+    register_class,
+    register_rescaling,
+)
 from ..mesh_target import load_target_mesh, target_on_mesh
 from ..opening import Station, Way
 from .opening import check_hinges, check_opening
@@ -332,6 +341,30 @@ def read_c_shell(data: Mapping[str, Any], source: str) -> CShell:
         )
     except InputError as error:
         raise error.at(source) from None
+
+
+@register_centring("c_shell")
+def centred_c_shell(data: Mapping[str, Any]) -> tuple[Mapping[str, Any], np.ndarray]:
+    """The C-shell with its curves, where they are joined and its target seen from the curves'
+    middle."""
+    curves = data["curves"]
+    middle = middle_of([p for curve in curves for p in curve.get("points", ())], "curves")
+    if len(middle) != 2 or not middle.any():
+        return data, np.zeros(3)
+    found = dict(data)
+    found["curves"] = [curve | {"points": moved(curve["points"], middle)} for curve in curves]
+    if not isinstance(data.get("crossings", "find"), str):
+        found["crossings"] = [
+            joint | {"near": moved([joint["near"]], middle)[0]} if "near" in joint else joint
+            for joint in data["crossings"]
+        ]
+    origin = np.append(middle, 0.0)
+    if "target" in data:
+        target = data["target"]
+        back = np.array(target.get("axes", np.eye(3)), float).T / float(target.get("scale", 1.0))
+        own = np.array(target.get("origin", (0.0, 0.0, 0.0)), float)
+        found["target"] = target | {"origin": (own + back @ origin).tolist()}
+    return found, origin
 
 
 @register_rescaling("c_shell")

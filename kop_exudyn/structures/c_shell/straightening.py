@@ -32,7 +32,10 @@ _AIMED_RATIOS = (0.6, 0.35, 0.15)
 _MOST_TURNING = np.radians(150.0)
 # Directions change by at most this, rad; beyond, the net would be another one.
 _MOST_SHIFT = 0.6
-_FLAT = 1e-9
+# rad: spans that turn by less are straight, however coarsely their coordinates are written; the
+# place of a corner that is hardly one would be left to rounding, of 1e-8 at 1e6 sizes from the
+# origin.
+_FLAT = 1e-6
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import InputError, SimulationFailure
+from ...geometry.centring import middle_of, moved
+from ...geometry.mesh_files import read_mesh
 from ...geometry.network import CurveNetwork
-from ...geometry.surfaces import AnalyticSurface, ScaledSurface, Surface
+from ...geometry.surfaces import PLAN_AXES, AnalyticSurface, ScaledSurface, Surface
 from ...rods.sections import Material, Section, material_from_dict, section_from_dict
 from ..base import Design, Role, Solve, Target, register_class, register_rescaling
 from ..loads import hold_in_place
@@ -203,8 +205,15 @@ def _triangulated(
 def read_grid(data: Mapping[str, Any], source: str) -> Grid:
     """The grid of a design file's content (see grid.schema.json). Raises InputError."""
     try:
+        on = data["surface"]
         origin = np.array(data.get("origin", (0.0, 0.0, 0.0)), float)
-        return grid_on(_surface(data["surface"], source, origin), data)
+        middle = _middle(on, source, origin)
+        network = data["network"]
+        if on.get("chart", "plane") == "plane":
+            network = _moved_network(network, middle[PLAN_AXES[on.get("up", "z")]])
+        grid = grid_on(_surface(on, source, origin + middle), {**data, "network": network})
+        grid.middle = on.get("size", 1.0) * middle
+        return grid
     except InputError as error:
         raise error.at(source) from None
 
@@ -222,9 +231,36 @@ def grid_on(surface: Surface, data: Mapping[str, Any]) -> Grid:
     )
 
 
+def _middle(data: Mapping[str, Any], source: str, origin: np.ndarray) -> np.ndarray:
+    """The middle (3,) of a surface's mesh, less the design's origin, zero near it and for formulas
+    (see `geometry.centring`)."""
+    if data["type"] != "mesh":
+        return np.zeros(3)
+    vertices = float(data.get("scale", 1.0)) * read_mesh(Path(source).parent / data["file"])[0]
+    return middle_of(vertices - origin, "surface.file")
+
+
+def _moved_network(data: Mapping[str, Any], middle: np.ndarray) -> Mapping[str, Any]:
+    """A design file's "network" with its parameters seen from a point (2,)."""
+    if not middle.any():
+        return data
+    found = dict(data)
+    for name, k in (("u", 0), ("v", 1)):
+        if name in data:
+            found[name] = (np.array(data[name], float) - middle[k]).tolist()
+    for name in ("domain", "through", "points", "second_points"):
+        if name in data:
+            found[name] = moved(data[name], middle)
+    if "curves" in data:
+        found["curves"] = [
+            curve | {"points": moved(curve["points"], middle)} for curve in data["curves"]
+        ]
+    return found
+
+
 def _surface(data: Mapping[str, Any], source: str, origin: np.ndarray) -> Surface:
-    """The surface of a design file's field; meshes lie in the coordinates of their files, the
-    design's origin is taken off them."""
+    """The surface of a design file's field; meshes lie in the coordinates of their files, an
+    origin is taken off them."""
     options = {key: value for key, value in data.items() if key not in ("type", "size")}
     if "size" in data:
         whole = _surface({"type": data["type"], **options}, source, origin)

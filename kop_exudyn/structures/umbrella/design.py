@@ -11,10 +11,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import InputError, SimulationFailure
+from ...geometry.centring import middle_of, moved
 from ...kit.groups import ElementGroup
 from ...rods.sections import Material, material_from_dict
 from ...units import Units
-from ..base import Design, Role, Solve, Target, register_class, register_format
+from ..base import (
+    Design,
+    Role,
+    Solve,
+    Target,
+    register_centring,
+    register_class,
+    register_format,
+)
 from ..fitting import best_placement
 from ..hardware import CellHardware
 from .bodies import RODS, joint_bodies
@@ -23,7 +32,7 @@ from .hardware import cell_hardware
 from .layout import BaseMesh, Plates, umbrella_mesh
 from .mesh import UmbrellaMesh, UmbrellaTarget
 from .pins import Anchor, Pins, anchor_on, pins_from_dict
-from .release import is_release, release_mesh
+from .release import centred_release, is_release, release_mesh
 
 if TYPE_CHECKING:
     from ...equilibrium.equilibria import Equilibrium, Start
@@ -108,9 +117,11 @@ class Umbrella(Design):
     ) -> Umbrella:
         """The design of a released file's content, in mm and N; options as for the class. Raises
         InputError."""
-        mesh = release_mesh(data, source)
+        near, origin = centred_release(data)
+        mesh = release_mesh(near, source)
         design = cls(options.pop("name", _stem(source)), mesh.scaled(mesh.unit), **options)
-        design.units = Units("mm", "N")
+        design.units, design.middle = Units("mm", "N"), mesh.unit * origin
+        design.origin = design.middle
         return design
 
     @cached_property
@@ -298,7 +309,7 @@ class Umbrella(Design):
     def report_positions(self, state: State) -> np.ndarray:
         """Positions of all joints, plates' included, in the order and the units of the design's own
         file."""
-        return self._bodies.positions(state)
+        return self.middle + self._bodies.positions(state)
 
     @property
     def hardware(self) -> CellHardware:
@@ -338,6 +349,25 @@ class Umbrella(Design):
 
 
 register_format("released umbrella mesh", is_release, Umbrella.from_release)
+
+
+@register_centring("umbrella")
+def centred_umbrella(data: Mapping[str, Any]) -> tuple[Mapping[str, Any], np.ndarray]:
+    """The mesh with its base, and with its target and pins, each seen from its own middle: where
+    the compact mesh lies doesn't matter where there is a target."""
+    base, target, pins = data["base"], data.get("target"), data.get("pins", {})
+    flat = middle_of(base["vertices"], "base.vertices")
+    found, origin = dict(data), np.append(flat, 0.0)
+    found["base"] = base | {"vertices": moved(base["vertices"], flat)}
+    if target is not None:
+        origin = middle_of(target["vertices"], "target.vertices")
+        parts = {name: moved(target[name], origin) for name in ("vertices", "crossings", "plates")}
+        found["target"] = target | parts
+    elif "positions" in pins:
+        origin = middle_of(pins["positions"], "pins.positions")
+    if "positions" in pins:
+        found["pins"] = pins | {"positions": moved(pins["positions"], origin)}
+    return (found, origin) if origin.any() or flat.any() else (data, origin)
 
 
 @register_class("umbrella")

@@ -207,7 +207,8 @@ class _Outline:
 
     def size(self) -> float:
         """Bounding-box diagonal of all joints and of the ends that rods on plate edges without arms
-        would have."""
+        would have; the box lies along the first triangle's first edge, so that turning the mesh
+        doesn't change it."""
         base, a = self.base, self.plates.arm_position
         corners = base.vertices[base.faces]
         middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
@@ -220,7 +221,12 @@ class _Outline:
             )
             for side, sign in ((TOP, -1), (BOTTOM, 1))
         ]
-        return float(np.linalg.norm(np.ptp(np.concatenate([self.positions, *points]), axis=0)))
+        along = base.vertices[base.faces[0, 1]] - base.vertices[base.faces[0, 0]]
+        c, s = along / np.linalg.norm(along)
+        turned = np.concatenate([self.positions, *points]) @ np.array(
+            [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
+        )
+        return float(np.linalg.norm(np.ptp(turned, axis=0)))
 
     def _seen_from_unflipped(self) -> np.ndarray:
         """(n_edges,) the port of every edge in its unflipped cell."""

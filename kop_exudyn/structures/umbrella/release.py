@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
+from ...geometry.centring import middle_of, moved
 from .mesh import BOTTOM, TOP, UmbrellaMesh, UmbrellaRods, UmbrellaTarget, arm_lengths
 
 _MAX_ITEMS = 2_000_000
@@ -50,6 +51,25 @@ def is_release(data: Any) -> bool:
         and not data.keys() & {"class", "format"}
         and len(data.keys() & REQUIRED) >= _LIKE_A_RELEASE
     )
+
+
+def centred_release(data: Mapping[str, Any]) -> tuple[Mapping[str, Any], np.ndarray]:
+    """A released file's content with the mesh and the target each seen from its own middle, and the
+    target's middle (3,), without one the mesh's; see `geometry.centring`."""
+    mesh = middle_of(data.get("vertices"), "vertices")
+    target = middle_of(data["target_v"], "target_v") if "target_v" in data else mesh
+    own = {"vertices": mesh}
+    if "target_v" in data:
+        own |= dict.fromkeys(("target_v", "correspondence", "plate_correspondence"), target)
+    try:
+        changed = {
+            name: moved(data[name], middle)
+            for name, middle in own.items()
+            if name in data and middle.any()
+        }
+    except (TypeError, ValueError):  # not points at all: refused where they are read
+        return data, np.zeros(3)
+    return {**data, **changed}, target
 
 
 def release_mesh(data: Mapping[str, Any], source: str = "umbrella mesh") -> UmbrellaMesh:

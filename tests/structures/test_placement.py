@@ -1,0 +1,145 @@
+"""Designs away from the origin, turned: the same structure, in the user's coordinates."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from support.placements import placed
+
+from kop_exudyn.analysis.simulation import simulate
+from kop_exudyn.equilibrium.newton import refine, solve
+from kop_exudyn.equilibrium.system import System
+from kop_exudyn.errors import InputError
+from kop_exudyn.exchange.states import states_of_simulation
+from kop_exudyn.rods.rotations import exp_so3
+from kop_exudyn.scene.builder import SceneBuilder
+from kop_exudyn.structures.base import design_from_dict
+from kop_exudyn.structures.umbrella.release import centred_release
+
+MODELS = ["small/01_sinh.json", "small/03_exp.json", "umbrellas/hill.json"]
+
+
+@pytest.fixture(scope="module", params=MODELS)
+def model(request, repository):
+    data = json.loads((repository / "models" / request.param).read_text())
+    design = design_from_dict(data)
+    return data, design, design.deploy()[design.fitted_role.name]
+
+
+@pytest.mark.parametrize("sizes, allowed", [(0.0, 1e-9), (1e5, 1e-9), (1e6, 4e-9)])
+def test_a_design_that_is_moved_and_turned_is_the_same(model, sizes, allowed):
+    """To 1e-9 of its size a hundred thousand sizes away; at a million, where coordinates are
+    rounded to 1e-10, to a few times that; in its file's coordinates to what these can tell."""
+    data, design, state = model
+    for seed in (0, 1):
+        moved, motion, size = placed(data, sizes, seed)
+        other = design_from_dict(moved)
+        found = other.deploy()[other.fitted_role.name]
+        x, y = design.report_positions(state.state), other.report_positions(found.state)
+        wanted = motion.rotation @ (x - x.mean(axis=0)).T
+        if design.class_name == "umbrella":  # turned about its own middle by the pose of its target
+            fit = Rotation.align_vectors(y - y.mean(axis=0), x - x.mean(axis=0))[0]
+            wanted = fit.as_matrix() @ (x - x.mean(axis=0)).T
+        here = found.state.positions if design.class_name != "umbrella" else y - other.middle
+        near = y - y.mean(axis=0) if sizes == 0 else None
+        inside = here[other.joints] if design.class_name != "umbrella" else here
+        apart = inside - inside.mean(axis=0) - wanted.T
+        assert np.abs(apart).max() < allowed * size
+        if near is not None:
+            assert np.abs(near - wanted.T).max() < allowed * size
+        goal = motion.apply(x) if design.class_name != "umbrella" else y
+        assert np.abs(y - goal).max() < (allowed + 4e-16 * sizes) * size
+        assert found.elastic_energy == pytest.approx(state.elastic_energy, rel=1e-6)
+        lengths = np.abs(other.parameters - design.parameters)
+        assert lengths.max() < 1e-12 * size + 1e-13 * sizes * size
+
+
+def test_simulations_and_files_have_the_users_coordinates(repository):
+    """Joints, rods in exported files, and Exudyn confirms what lies 50 sizes away."""
+    data = json.loads((repository / "models" / "small" / "03_exp.json").read_text())
+    design = design_from_dict(data)
+    moved, motion, size = placed(data, 50.0, 3)
+    other = design_from_dict(moved)
+    a, b = simulate(design), simulate(other)
+    assert np.abs(motion.apply(a.joints) - b.joints).max() < 1e-9 * size
+    assert b.fit.max_percent == pytest.approx(a.fit.max_percent, rel=0.5)  # the box turns
+    for near, far in zip(states_of_simulation(a), states_of_simulation(b)):
+        assert np.abs(motion.apply(near.points) - far.points).max() < 1e-7 * size
+        if near.target is not None:
+            # beside the joints a symmetric net's target is interpolated over either diagonal
+            assert np.nanmax(np.abs(near.deviations - far.deviations)) < 3e-4 * size
+
+
+@pytest.mark.parametrize("name", ["small/01_sinh.json", "umbrellas/dome.json"])
+def test_what_double_precision_cannot_tell_is_refused(repository, name):
+    data = json.loads((repository / "models" / name).read_text())
+    moved, _, _ = placed(data, 2e8, 0)
+    with pytest.raises(InputError, match="times its own size from the origin"):
+        design_from_dict(moved, "far.json")
+
+
+def test_grids_on_meshes_lie_where_their_mesh_does(tmp_path):
+    """A paraboloid's mesh at a kilometre: curves in the plane move with it."""
+    x, y = (c.ravel() for c in np.meshgrid(*[np.linspace(-1.2, 1.2, 25)] * 2, indexing="ij"))
+    k = np.arange(24)
+    corner = (k[:, None] * 25 + k).ravel()
+    faces = [[c, c + 25, c + 26] for c in corner] + [[c, c + 26, c + 1] for c in corner]
+    joints = []
+    for shift in (np.zeros(3), np.array([1024.0, -2048.0, 512.0])):
+        points = np.stack([x, y, 0.3 * x**2 - 0.2 * y**2], axis=1) + shift
+        lines = [f"v {p[0]!r} {p[1]!r} {p[2]!r}" for p in points.tolist()]
+        lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]
+        (tmp_path / "mesh.obj").write_text("\n".join(lines))
+        data = {
+            "format": "kop_exudyn/design",
+            "version": 1,
+            "class": "grid",
+            "name": "far",
+            "material": {"young": 2.1e9, "poisson": 0.35},
+            "section": {"type": "rectangle", "width": 0.004, "height": 0.03},
+            "surface": {"type": "mesh", "file": "mesh.obj"},
+            "network": {
+                "type": "isolines",
+                "u": (np.linspace(-0.8, 0.8, 4) + shift[0]).tolist(),
+                "v": (np.linspace(-0.7, 0.7, 4) + shift[1]).tolist(),
+            },
+            "held": "corners",
+        }
+        design = design_from_dict(data, str(tmp_path / "far.json"))
+        state = refine(design.systems["deployed"], design.deploy()["deployed"]).state
+        joints.append(design.report_positions(state) - shift)
+    assert np.abs(joints[0] - joints[1]).max() < 1e-9
+
+
+def test_released_meshes_are_centred_by_field():
+    vertices = [[1e6, 0.0, 0.0], [1e6 + 1, 1.0, 2.0]]
+    data = {
+        "vertices": vertices,
+        "target_v": [[0.0, 0.0, 5e6], [1.0, 1.0, 5e6 + 1]],
+        "correspondence": [None, [0.0, 0.5, 5e6]],
+    }
+    near, origin = centred_release(data)
+    assert origin.tolist() == [0.5, 0.5, 5e6 + 0.5]
+    assert near["vertices"] == [[-0.5, -0.5, -1.0], [0.5, 0.5, 1.0]]
+    assert near["correspondence"] == [None, [-0.5, 0.0, -0.5]]
+    assert centred_release({"vertices": "x"})[1].tolist() == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("sizes", [0.0, 1e3, 1e5])
+def test_scenes_of_python_programs_converge_as_far_as_they_can(sizes):
+    """A bent cantilever away from the origin: its forces are resolved to eps times its distance."""
+    build = SceneBuilder()
+    n, turn = 8, exp_so3(np.array([[0.3, -0.5, 0.2]]))[0]
+    line = np.linspace([0, 0, 0], [1, 0, 0], n + 1) @ turn.T + sizes * np.array([0.6, 0.64, 0.48])
+    bodies = build.bodies(line, turn)
+    build.rod(
+        build.nodes(bodies), [2e5, 1e5, 1e5, 0.8, 1.0, 2.0], length=1.0, curvature=[0, 0.5, 0]
+    )
+    build.pin(0)
+    eq = solve(System(build.build()), np.zeros(0))
+    tip = turn.T @ (eq.state.positions[-1] - eq.state.positions[0])
+    assert tip[0] == pytest.approx(np.sin(0.5) / 0.5, abs=1e-9 + 1e-14 * sizes * 1e2)
+    assert abs(tip[2]) == pytest.approx((1 - np.cos(0.5)) / 0.5, abs=1e-9 + 1e-14 * sizes * 1e2)
