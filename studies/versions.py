@@ -65,7 +65,10 @@ def main() -> None:
         f"{outcome} over {len(ratios)} cases." if ratios else "Nothing could run."
     )
     report.section("Both versions").table("versions", rows, "Ratios below 1: this one needs less.")
-    report.save({"versions": rows}, {"rounds": max(case.rounds for case in cases)})
+    report.save(
+        {"versions": rows},
+        {"other": Path(chosen.other).name, "rounds": max(case.rounds for case in cases)},
+    )
 
 
 if __name__ == "__main__":

@@ -57,8 +57,9 @@ def _directed_edges(network: CurveNetwork) -> tuple[np.ndarray, np.ndarray, np.n
     1 are opposite."""
     edges, angles, areas = [], [], []
     for strand in network.strands:
-        for k, (span, ends) in enumerate(zip(strand.spans, strand.joints[strand.ends].tolist())):
-            x = strand.curve.position(np.linspace(span[0], span[1], _SAMPLES + 1))
+        stations = np.linspace(strand.spans[:, 0], strand.spans[:, 1], _SAMPLES + 1, axis=1)
+        places = strand.curve.position(stations)
+        for k, (x, ends) in enumerate(zip(places, strand.joints[strand.ends].tolist())):
             x[0], x[-1] = network.joints[ends]
             area = 0.5 * np.sum(x[:-1, 0] * x[1:, 1] - x[1:, 0] * x[:-1, 1])
             edges += [ends, ends[::-1]]
