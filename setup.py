@@ -19,15 +19,19 @@ _spec.loader.exec_module(build_kernels)
 class BuildWithKernels(build_py):
     def run(self):
         super().run()
-        if self.editable_mode:  # compiled at first use, and again after changes
+        if self.editable_mode:
+            self._compile(Path())
             return
         for file in sorted(Path("models").glob("*/*")):  # for `kop examples`
             if file.suffix in (".json", ".obj"):
                 copy = Path(self.build_lib) / "kop_exudyn" / "examples" / file.parent.name
                 copy.mkdir(parents=True, exist_ok=True)
                 shutil.copy(file, copy)
+        self._compile(Path(self.build_lib))
+
+    def _compile(self, root):
         try:
-            build_kernels.build(Path(self.build_lib) / FOLDER / build_kernels.BUILT.name)
+            build_kernels.build(root / FOLDER / build_kernels.BUILT.name)
         except build_kernels.BuildError as error:
             self.warn(f"the kernels are not compiled, NumPy will be used instead: {error}")
 
