@@ -2,15 +2,17 @@
 
 The way is a sequence of stations: the growing mean angles of a C-shell, say. Opened from the
 assembly, each station's state is solved from the one before it, and the last one leads to the
-deployed state. Once these states are known for one design, those of a design with other parameters
-are predicted from them by sensitivities and corrected; what is left to verify is that each state
-leads into the next.
+deployed state. Where an assembly is flat, and has many ways to leave its plane, the builder lifts
+it towards the wanted shape at one station, early on, while that takes little force; from there on
+nothing but the opening moves it. Once these states are known for one design, those of a design with
+other parameters are predicted from them by sensitivities and corrected up to there; what is left to
+verify is that each state leads into the next.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -22,9 +24,7 @@ from ..equilibrium.system import System
 from ..errors import SimulationFailure
 
 SAME_STATE = 1e-3  # of the bounding box: states whose joints are this close are one
-_FLAT = 1e-4  # of the joints' extent: less than that out of their plane is none
 _MOST_ITERATIONS = 80  # of a correction; what takes longer isn't near the predicted state
-_HALVINGS = 4  # of a step that leaves the assembly's plane
 _PARTS = (1, 2, 4)  # of the way between two stations that one is led to the other in
 
 
@@ -35,17 +35,14 @@ class Station:
     name : as messages and results have it
     scene : name of the scene that it is a state of, see `Design.systems`
     opening : rad, prescribed mean hinge angle, or None without actuation
-    side : (n_free,) direction out of the assembly's plane that the builder pushes to, or None
+    lifted : shape that the builder lifts the assembly to at this station before it is let go, or
+        None; at most one station of a way has one
     """
 
     name: str
     scene: str
     opening: float | None = None
-    side: np.ndarray | None = None
-
-    @property
-    def options(self) -> NewtonOptions:
-        return NewtonOptions(side=self.side)
+    lifted: Start | None = None
 
 
 @dataclass(frozen=True)
@@ -77,22 +74,23 @@ class Way:
         """The states at all stations and the deployed one, each solved from the one before, by
         the fast solver or another engine's `solve`.
 
-        Mean angles grow in half the steps from station to station, and in shorter ones where the
-        assembly leaves its plane: far beyond the bifurcation an iteration may end on the other
-        side. Iterations of a state count those of all steps to it. Raises SimulationFailure, naming
-        the station, where none is found.
+        Mean angles grow in half the steps from station to station. Iterations of a state count
+        those of the half-step before it. Raises SimulationFailure, naming the station, where none
+        is found.
         """
         found: list[Equilibrium] = []
         before: Start | Equilibrium = assembled
         opening = self.opening
         for station in (*self.stations, self.deployed):
             system, steps = systems[station.scene], [station.opening]
+            if station.lifted is not None:
+                before, opening = station.lifted, None
             if opening is not None and station.opening is not None:
                 steps = [0.5 * (opening + station.opening), station.opening]
             passed: list[Equilibrium] = []
             try:
                 for to in steps:
-                    passed += _opened_to(solve, system, q, before, opening, to, station, _HALVINGS)
+                    passed.append(solve(system, q, before, to))
                     before, opening = passed[-1], to
             except SimulationFailure as failure:
                 raise failure.within(station.name) from None
@@ -108,10 +106,11 @@ class Way:
     ) -> list[Equilibrium]:
         """The states at the stations, from those known at other parameters.
 
-        A state that has left the assembly's plane has to lead into the next one, and the last into
-        `deployed`; those in the plane, and the first one out of it, are predicted from the known
-        ones. A step that is too long may miss the branch, so more and shorter ones are taken before
-        the way counts as broken. Raises SimulationFailure, naming the station, where it does.
+        From the station on where the assembly is lifted, as it is there, each has to lead into the
+        next one, and the last into `deployed`; those before are predicted from the known ones.
+        Without lifting, the first one is. A step that is too long may miss the branch, so more and
+        shorter ones are taken before the way counts as broken. Raises SimulationFailure, naming the
+        station, where it does.
         """
         reason = SimulationFailure("no station", where=self.deployed.name)
         for parts in _PARTS:
@@ -138,11 +137,11 @@ class Way:
     ) -> list[Equilibrium]:
         """The states at the stations, each led to in so many steps, and where they lead to."""
         found: list[Equilibrium] = []
-        for number, (station, near) in enumerate(
-            zip((*self.stations, self.deployed), (*known, deployed))
-        ):
+        stations = (*self.stations, self.deployed)
+        first = next((k for k, s in enumerate(stations) if s.lifted is not None), 0)
+        for number, (station, near) in enumerate(zip(stations, (*known, deployed))):
             try:
-                if found and not self.is_flat(found[-1]):
+                if number > first:
                     before = systems[self.stations[number - 1].scene]
                     found.append(_led(before, systems[station.scene], q, found[-1], station, parts))
                 else:
@@ -150,12 +149,6 @@ class Way:
             except SimulationFailure as failure:
                 raise failure.within(station.name) from None
         return found
-
-    def is_flat(self, state: Equilibrium) -> bool:
-        """Whether the joints lie in one plane."""
-        x = state.state.positions[self.joints]
-        sizes = np.linalg.svd(x - x.mean(axis=0), compute_uv=False)
-        return bool(sizes[2] <= _FLAT * sizes[0])
 
     def apart(self, a: Equilibrium, b: Equilibrium) -> float:
         """The largest distance of a joint in two states at their best placement, as a share of
@@ -166,48 +159,16 @@ class Way:
         return float(np.linalg.norm(turn.apply(x) - y, axis=1).max()) / self.diagonal
 
 
-def _opened_to(
-    solve: Callable[..., Equilibrium],
-    system: System,
-    q: np.ndarray,
-    before: Start | Equilibrium,
-    opening: float | None,
-    to: float | None,
-    station: Station,
-    halvings: int,
-) -> list[Equilibrium]:
-    """The states on a step to another opening; it is halved where the wrong side is taken."""
-    here = solve(system, q, before, to, station.options)
-    wrong = here.escapes > 0 and station.side is not None and _height(system, here, station) < 0
-    if not wrong or opening is None or to is None or not halvings:
-        return [here]
-    half = 0.5 * (opening + to)
-    first = _opened_to(solve, system, q, before, opening, half, station, halvings - 1)
-    return first + _opened_to(solve, system, q, first[-1], half, to, station, halvings - 1)
-
-
-def _height(system: System, state: Equilibrium, station: Station) -> float:
-    """How far a state lies to the side that a builder pushes to."""
-    places = np.zeros(system.scene.n_dofs)
-    positions = state.state.positions
-    places[: 6 * len(positions)].reshape(-1, 6)[:, :3] = positions
-    side = station.side
-    assert side is not None
-    return float(places[system.sparsity.free] @ side / max(np.linalg.norm(side), 1e-300))
-
-
 def _near(system: System, q: np.ndarray, near: Equilibrium, station: Station) -> Equilibrium:
-    """A station's state, predicted from one at other parameters and corrected.
-
-    Close to the bifurcation out of the plane the prediction may end on the other side; the known
-    state itself is the safer start then.
-    """
-    options = replace(station.options, max_iterations=_MOST_ITERATIONS)
-    for start in (Sensitivities(system, near).predict(q - near.q), near):
-        here = solve(system, q, start, station.opening, options)
-        if station.side is None or _height(system, here, station) >= -_FLAT * system.scene.size:
-            return here
-    raise SimulationFailure("rises to the other side")
+    """A station's state: from its lifted shape, or predicted from one at other parameters."""
+    if station.lifted is not None:
+        return solve(system, q, station.lifted, station.opening)
+    options, opening = NewtonOptions(max_iterations=_MOST_ITERATIONS), station.opening
+    start = Sensitivities(system, near).predict(q - near.q)
+    try:
+        return solve(system, q, start, opening, options)
+    except SimulationFailure:  # close to a bifurcation the prediction overshoots
+        return solve(system, q, near, opening, options)
 
 
 def _led(

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -193,23 +194,26 @@ class CShell(Design):
     @cached_property
     def way(self) -> Way:
         """From the flat assembly by growing mean angles, to the side that the smooth design rises
-        to."""
+        to; it is lifted to that one's shape at the first station at which that isn't flat."""
         end = self.fitted_role.opening
         assert end is not None
-        free = self.systems["deployed"].sparsity.free
         steps = max(1, int(np.ceil(abs(end - self._rest_opening) / _STATION_STEP - 1e-9)))
-        stations = tuple(
+        stations = [
             Station(
                 f"opened by {k / steps:.0%}",
                 "deployed",
                 self._rest_opening + (end - self._rest_opening) * k / steps,
-                self._heights(k / steps)[free],
             )
             for k in range(1, steps + 1)
-        )
-        return Way(
-            self._rest_opening, stations[:-1], stations[-1], self.joints, self.target.diagonal
-        )
+        ]
+        for number in range(steps):
+            smooth = self._smooth_at((number + 1) / steps)
+            if np.ptp(smooth.state.positions[:, 2]) > _FLAT * self.network.size:
+                shape = self.layout.straightened(smooth.state, self.scene("deployed"))
+                stations[number] = replace(stations[number], lifted=Start(shape, smooth.torque))
+                break
+        *way, last = stations
+        return Way(self._rest_opening, tuple(way), last, self.joints, self.target.diagonal)
 
     def assembled(self, q: np.ndarray, equilibria: Mapping[str, Equilibrium]) -> Start:
         """The rest state, off the floor."""
@@ -222,17 +226,10 @@ class CShell(Design):
         assert opening is not None
         return opening
 
-    def _heights(self, share: float) -> np.ndarray:
-        """(n_dofs,) heights of the smooth design opened by a share, or as soon as it isn't flat."""
+    def _smooth_at(self, share: float) -> Equilibrium:
+        """The smooth design's state nearest to being opened by a share, or by more."""
         path = self.smooth_path
-        first = min(len(path) - 1, int(np.ceil(share * (len(path) - 1) - 1e-9)))
-        out = np.zeros(self.scene("deployed").n_dofs)
-        places = out[: 6 * len(self.layout.smooth)].reshape(-1, 6)
-        for equilibrium in path[first:]:
-            places[:, 2] = equilibrium.state.positions[:, 2]
-            if np.ptp(places[:, 2]) > _FLAT * self.network.size:
-                break
-        return out
+        return path[min(len(path) - 1, int(np.ceil(share * (len(path) - 1) - 1e-9)))]
 
     @cached_property
     def target(self) -> Target:
