@@ -21,7 +21,7 @@ from ..search.result import KitResult
 from ..search.run import optimize_kit
 from ..search.settings import JobSettings
 from ..search.stage_results import StageResult
-from ..search.stages import NoStore, Store
+from ..search.stages import NoStore, PrefixedStore, Store
 from ..structures.base import Design
 from .reuse import counts_of, fabricated, kit_size_percent
 
@@ -29,7 +29,6 @@ log = logging.getLogger(__name__)
 
 _SHARE = 0.25  # of a kind's parts, by which kits grow, and shrink at first
 _MOST = 60  # parts of a kind; designs that need more share nothing worth the name
-_PREFIX = "{}-{}-"
 
 
 @dataclass(frozen=True)
@@ -229,7 +228,9 @@ class _Chain:
         before: StageResult | None = None
         if start is not None and np.isfinite(start.max_percent):
             before = start.result.stages["assigned"]
-        own = _Named(self.store, _PREFIX.format(len(self.kits), "-".join(map(str, sizes.values()))))
+        own = PrefixedStore(
+            self.store, _PREFIX.format(len(self.kits), "-".join(map(str, sizes.values())))
+        )
         result = optimize_kit(
             self.designs,
             sizes,
@@ -250,19 +251,6 @@ class _Chain:
         self.kits.append(found)
         self.observer(found)
         return found
-
-
-class _Named:
-    """A store that puts a prefix before the names of its checkpoints."""
-
-    def __init__(self, store: Store, prefix: str):
-        self.store, self.prefix = store, prefix
-
-    def load(self, name: str) -> Mapping[str, np.ndarray] | None:
-        return self.store.load(self.prefix + name)
-
-    def save(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
-        self.store.save(self.prefix + name, arrays)
 
 
 def _fabricated(result: KitResult) -> dict[str, int]:

@@ -139,6 +139,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "dozen; quick: that of the relaxed stage alone; thorough: the best five of many)",
     )
     parser.add_argument(
+        "--published",
+        action="store_true",
+        help="also find a kit of as many parts by the published method (BFGS, nearest parts), to "
+        "compare with; takes several times as long",
+    )
+    parser.add_argument(
         "--redeployments",
         type=not_negative,
         metavar="N",
@@ -230,7 +236,9 @@ def run(args: argparse.Namespace) -> int:
         out=args.out,
         inputs=study.files,
         resume=args.resume,
-        settings=study.job_settings(designs, args.jobs or usable_cores()),
+        settings=replace(
+            study.job_settings(designs, args.jobs or usable_cores()), published=args.published
+        ),
         overwrite=args.overwrite,
         progress=not args.quiet,
         kit=kit,

@@ -192,6 +192,8 @@ def remarks(result: KitResult) -> list[str]:
     ]
     found += [_about_clustering(kind, gap) for kind, gap in result.clustering.items()]
     found = [remark for remark in found if remark]
+    if "published" in result.stages and result.seconds:
+        found.append(_about_published(result))
     if len(result.tried) > 1:
         found.append(_about_starts(result.tried))
     return found + [
@@ -199,6 +201,28 @@ def remarks(result: KitResult) -> list[str]:
         for name, stage in stages.items()
         if stage.status
     ]
+
+
+def _about_published(result: KitResult) -> str:
+    """The published method beside ours: deviation of the opened states, energy, steps, time."""
+
+    def told(stage: str) -> str:
+        found = [result.summary(stage, n) for n in range(len(result.designs))]
+        failed = [design.name for design, one in zip(result.designs, found) if "failed" in one]
+        if failed:
+            return f"can't build {', '.join(failed)}"
+        largest = max(one["fit"]["max_percent"] for one in found)
+        ratio = sum(one["energy_ratio"] for one in found) / len(found)
+        return f"largest deviation {largest:.2f} %, energy {ratio:.2f} times the inputs'"
+
+    steps = result.stages["published"].steps
+    return (
+        f"The published method (BFGS, nearest parts, no reassignment) with as many parts: "
+        f"{told('published')} in the states that the designs are led to, "
+        f"{told('published_opened')} as they open; {steps} steps in "
+        f"{result.seconds['published']:.0f} s. This kit: {told('assigned')}; "
+        f"{result.seconds['search']:.0f} s."
+    )
 
 
 def _about_starts(tried: Sequence[TriedStart]) -> str:

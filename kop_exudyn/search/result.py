@@ -23,7 +23,7 @@ from .starts import TriedStart
 
 INPUT = "input"  # the designs as given, before all stages
 REDEPLOYED = "redeployed"  # the assigned designs, opened from their assembly
-STAGES = ("direct", "unrelaxed", "relaxed", "assigned")
+STAGES = ("direct", "unrelaxed", "published", "published_opened", "relaxed", "assigned")
 
 
 @dataclass
@@ -31,7 +31,8 @@ class KitResult:
     """All stages of one run.
 
     designs, references : what was asked for
-    stages : by name ("direct", "unrelaxed", "relaxed", "assigned")
+    stages : by name ("direct", "unrelaxed", "relaxed", "assigned"; "published": what the published
+        method leaves, and "published_opened": the same as its designs open from their assembly)
     at_parts : between the last two: every element its nearest part, where the assigned stage began;
         None where the result was read from a file
     events : accepted steps of all SQPs, in order
@@ -40,6 +41,7 @@ class KitResult:
         (`Evaluation.utilisation`); empty where it wasn't computed
     clustering : by kind, how far the parts that the search began with are from the best clustering
         of the input elements
+    seconds : wall time of "search" (both stages) and, where that was asked for, "published"
     tried : starts of the assigned stage, and what came of them
     equilibria, newton_iterations : solved in all
     settings : as given, for the record
@@ -58,6 +60,7 @@ class KitResult:
     redeployed: Sequence[Evaluation | SimulationFailure] = ()
     clustering: Mapping[str, ClusteringGap] = field(default_factory=dict)
     tried: Sequence[TriedStart] = ()
+    seconds: dict[str, float] = field(default_factory=dict)
 
     @property
     def units(self) -> Units | None:
@@ -143,7 +146,7 @@ class KitResult:
             "tried": [asdict(start) for start in self.tried],
             "steps": {
                 stage: self.stages[stage].steps
-                for stage in ("relaxed", "assigned", "unrelaxed")
+                for stage in ("relaxed", "assigned", "unrelaxed", "published")
                 if stage in self.stages
             },
             "objective": {
@@ -165,6 +168,7 @@ class KitResult:
             "equilibria": self.equilibria,
             "newton_iterations": self.newton_iterations,
             "wall_s": self.wall_s,
+            "seconds": dict(self.seconds),
             "peak_memory_mb": self.peak_memory_mb,
             "settings": dict(self.settings),
             "history": events_to_list(self.events),

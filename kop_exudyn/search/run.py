@@ -23,11 +23,12 @@ from .dataset import Dataset
 from .neighbours import resized
 from .objective import Evaluation, Weights
 from .pool import DesignPool
+from .published import published_method
 from .requirements import Requirements
 from .result import KitResult
 from .settings import JobSettings
 from .stage_results import StageEvent, StageResult
-from .stages import Observer, Stages, Store
+from .stages import NoStore, Observer, Stages, Store
 from .starts import assigned_from_starts
 
 
@@ -85,7 +86,7 @@ def optimize_kit(
         baselines = Stages(dataset, sought, free, store, observe)
         stages = Stages(dataset, sought, settings.stages, store, observe)
         result = KitResult(list(designs), pool.references, events=events)
-        found = result.stages
+        found, begin_search = result.stages, perf_counter()
         if isinstance(start, StageResult):
             announce("splitting and merging parts")
             result.at_parts = stages.confirmed(resized(stages, start, dict(parts or {})))
@@ -98,6 +99,18 @@ def optimize_kit(
             if settings.baselines and kit is None:
                 announce("unrelaxed baseline")
                 found["unrelaxed"] = baselines.assigned(found["direct"], "unrelaxed")
+            if settings.published and kit is None:
+                published = published_method(
+                    dataset,
+                    dict(parts or {}),
+                    settings.stages,
+                    store or NoStore(),
+                    observer,
+                    announce,
+                )
+                found["published"], found["published_opened"] = published.led, published.opened
+                result.seconds["published"] = published.seconds
+            begin_search = perf_counter()
             announce("relaxed stage")
             relaxed = stages.relaxed(found["direct"].kit)
             announce("path to the parts")
@@ -109,6 +122,7 @@ def optimize_kit(
         found["assigned"], result.tried = assigned_from_starts(stages, result.at_parts, bases)
         announce("deployment of the assigned designs")
         found["assigned"] = opened_stage(stages, found["assigned"])
+        result.seconds["search"] = perf_counter() - begin_search
         result.redeployed = stages.redeployed(found["assigned"])
         if "direct" in found:
             announce("bound on the clustering")

@@ -90,14 +90,13 @@ class StageSettings:
     constraints: LinearConstraints | None = None
     hessian: str = "exact"
     effort: str = "normal"
+    requirements: Requirements = Requirements()
 
     def __post_init__(self) -> None:
         if self.effort not in EFFORTS:
             raise InputError(
                 f"unknown (known: {', '.join(EFFORTS)})", field="effort", value=self.effort
             )
-
-    requirements: Requirements = Requirements()
 
 
 @dataclass(frozen=True)
@@ -110,6 +109,7 @@ class JobSettings:
     stages : settings of the stages
     jobs : processes
     baselines : also compute the unrelaxed baseline
+    published : also find a kit by the published method, see published.py
     """
 
     weights: Weights | None = None
@@ -117,3 +117,4 @@ class JobSettings:
     stages: StageSettings = StageSettings()
     jobs: int = 2
     baselines: bool = True
+    published: bool = False

@@ -48,6 +48,19 @@ class NoStore:
         pass
 
 
+class PrefixedStore:
+    """A store that puts a prefix before the names of its checkpoints."""
+
+    def __init__(self, store: Store, prefix: str):
+        self.store, self.prefix = store, prefix
+
+    def load(self, name: str) -> Mapping[str, np.ndarray] | None:
+        return self.store.load(self.prefix + name)
+
+    def save(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
+        self.store.save(self.prefix + name, arrays)
+
+
 Observer = Callable[[StageEvent], None]
 
 
