@@ -228,9 +228,8 @@ class _Chain:
         before: StageResult | None = None
         if start is not None and np.isfinite(start.max_percent):
             before = start.result.stages["assigned"]
-        own = PrefixedStore(
-            self.store, _PREFIX.format(len(self.kits), "-".join(map(str, sizes.values())))
-        )
+        counts = "-".join(map(str, sizes.values()))
+        own = PrefixedStore(self.store, f"{len(self.kits)}-{counts}-")
         result = optimize_kit(
             self.designs,
             sizes,
