@@ -300,7 +300,8 @@ def assembly_drawing(parts: PartsList, name: str, unit: str) -> AssemblyDrawing:
 def flattened(
     parts: PartsList, placed: PlacedPieces, state: State, scale: float = 1.0
 ) -> AssemblyDrawing:
-    """A state projected along the direction in which the joints extend least.
+    """A state projected along the direction in which the joints extend least, as narrow as it can
+    be.
 
     scale : millimetres of the design's unit of length
     """
@@ -310,7 +311,8 @@ def flattened(
     right, _, normal = np.linalg.svd(joints - centre)[2]
     if normal @ state.rotations[placed.design.joints][:, :, 2].mean(axis=0) < 0:
         normal = -normal
-    axes = scale * np.stack([right, np.cross(normal, right)], axis=1)
+    plane = np.stack([right, np.cross(normal, right)], axis=1)
+    axes = scale * plane @ _turn_across((joints - centre) @ plane)
     flat = (x - centre) @ axes
     return AssemblyDrawing(
         parts,
@@ -320,6 +322,19 @@ def flattened(
         {p: (state.positions[c.body] - centre) @ axes for p, c in placed.corners.items()},
         _plates(placed, centre, axes),
     )
+
+
+def _turn_across(points: np.ndarray) -> np.ndarray:
+    """(2, 2) turn after which points (n, 2) @ it take the smallest rectangle, its long side lying
+    across."""
+    around = shapely.minimum_rotated_rectangle(shapely.MultiPoint(points))
+    if around.geom_type != "Polygon":
+        return np.eye(2)
+    corners = np.array(around.exterior.coords)
+    sides = np.diff(corners[:3], axis=0)
+    x, y = sides[np.argmax(np.linalg.norm(sides, axis=1))]
+    length = np.hypot(x, y) * (1 if x >= 0 else -1)
+    return np.array([[x, -y], [y, x]]) / length
 
 
 def _plates(placed: PlacedPieces, centre: np.ndarray, axes: np.ndarray) -> np.ndarray:

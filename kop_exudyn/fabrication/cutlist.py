@@ -48,6 +48,8 @@ def cut_list(blanks: Blanks, tolerances: Tolerances = Tolerances()) -> list[dict
                 f"in_{d.design.name}": int(parts.counts[name][k, number])
                 for k, d in enumerate(parts.designs)
             }
+            if label in strips:
+                row |= _sawn(strips[label])
             row |= _dimensions(kind, value, blanks.scale, tolerances)
             row |= {
                 f"bars_{bar.label.removeprefix(label).strip()}": bar.count
@@ -59,8 +61,6 @@ def cut_list(blanks: Blanks, tolerances: Tolerances = Tolerances()) -> list[dict
                 for arm in (() if blanks.cells is None else blanks.cells.arms)
                 if arm.label.startswith(f"{label} ")
             }
-            if label in strips:
-                row |= _sawn(strips[label])
             if label in plates:
                 row |= {
                     "leg_mm": _mm(plates[label].leg),
@@ -84,7 +84,7 @@ def totals(blanks: Blanks) -> list[dict[str, Any]]:
             {
                 "item": "strips",
                 "section_mm": board.section,
-                "material": board.material,
+                "material": board.material or None,
                 "pieces": sum(strip.count for strip in strips),
                 "length_m": round(length, 3),
                 "area_m2": round(length * board.breadth / 1000, 4),
@@ -96,7 +96,7 @@ def totals(blanks: Blanks) -> list[dict[str, Any]]:
             {
                 "item": "corner plates",
                 "section_mm": f"{board.thickness:g} thick",
-                "material": board.material,
+                "material": board.material or None,
                 "pieces": sum(plate.count for plate in blanks.plates),
                 "area_m2": round(area / 1e6, 4),
             }
@@ -107,7 +107,7 @@ def totals(blanks: Blanks) -> list[dict[str, Any]]:
             {
                 "item": "bars",
                 "section_mm": board.section,
-                "material": board.material,
+                "material": board.material or None,
                 "pieces": sum(bar.count for bar in blanks.bars),
                 "length_m": round(length, 3),
             }
@@ -193,15 +193,16 @@ def _sawn(strip: Strip) -> dict[str, Any]:
     row: dict[str, Any] = {
         "cut_length_mm": _mm(strip.cut_length),
         "hole_from_end_mm": _mm(strip.hole_from_end),
-        "setback_mm": _mm(strip.setback),
         "bolts_from_end_mm": _several(strip.bolt_stations),
         "bolt_hole_mm": strip.bolt_hole if strip.bolts else None,
         "section_mm": strip.board.section,
         "material": strip.board.material or None,
     }
     if strip.slot is None:
-        return row | {"joint_hole_mm": strip.hole}
-    return row | {"slot_width_mm": _mm(strip.slot), "slot_depth_mm": _mm(strip.slot_depth)}
+        joint = {"joint_hole_mm": strip.hole}
+    else:
+        joint = {"slot_width_mm": _mm(strip.slot), "slot_depth_mm": _mm(strip.slot_depth)}
+    return row | joint | {"setback_mm": _mm(strip.setback)}
 
 
 def _mm(value: float) -> float:

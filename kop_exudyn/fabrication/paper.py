@@ -112,7 +112,8 @@ class Book:
 
     def table(self, heading: str, rows: Sequence[dict[str, Any]], note: str = "") -> None:
         """Rows of equal columns, on as many pages as they take; under the first one a note."""
-        columns = list(dict.fromkeys(name for row in rows for name in row))
+        known = (name for row in rows for name, value in row.items() if value is not None)
+        columns = list(dict.fromkeys(known))
         cells = [[_cell(name, row.get(name)) for name in columns] for row in rows]
         right = [_is_numeric(row.get(name) for row in rows) for name in columns]
         heads = [_head(name) for name in columns]
