@@ -517,7 +517,7 @@ def test_a_reader_that_stops_early_is_no_error(joints):
         "from kop_exudyn.io import designs",
         "designs.load_design = lambda path: SimpleNamespace(units=None)",
         f"answer = {{'joints': [[0.0] * 3] * {joints}}}",
-        "simulation.simulate = lambda design: SimpleNamespace(to_dict=lambda: answer)",
+        "simulation.simulate = lambda design, engine: SimpleNamespace(to_dict=lambda: answer)",
         "sys.exit(cli.main(['simulate', 'x', '--json']))",
     ]
     process = subprocess.Popen(

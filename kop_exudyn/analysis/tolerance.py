@@ -24,6 +24,7 @@ from ..structures.fitting import best_placement
 from .buckling import snapped
 
 _STEPS_BACK = 3  # to the planned elements, which are near
+CONFIRMED = 0.1  # share of the samples that Exudyn confirms
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,7 @@ class Sample:
 
     snapped : into another state, from which the design doesn't come back when the errors are taken
         away
+    confirmed : by Exudyn, which only some samples are given to
     """
 
     errors: np.ndarray
@@ -91,6 +93,7 @@ class Sample:
     max_percent: float | None
     failed: str | None = None
     snapped: bool = False
+    confirmed: bool = False
 
 
 def joint_jacobian(design: Design, evaluation: Evaluation) -> np.ndarray:
@@ -131,21 +134,29 @@ def sample_spread(
     tolerance: Tolerance,
     number: int,
     seed: int = 0,
+    confirmed: float = CONFIRMED,
 ) -> list[Sample]:
     """Re-solved equilibria for `number` sets of normally distributed errors; the same errors for
     the same seed.
 
-    A set for which no equilibrium is found is a sample with its reason.
+    confirmed : share of the samples that Exudyn has to confirm, evenly spread, the first one among
+        them
+
+    A set for which no equilibrium is found, or whose equilibrium Exudyn doesn't confirm, is a
+    sample with its reason.
     """
     generator, deviations = np.random.default_rng(seed), tolerance.deviations(design)
     role = design.fitted_role.name
     objective = DesignObjective(design)
     wanted = evaluation.equilibria[role].state.positions[design.joints]
     samples = []
-    for _ in range(number):
+    for k in range(number):
         errors = deviations * generator.standard_normal(len(deviations))
         try:
             found = objective.evaluate(evaluation.q + errors, evaluation)
+            asked = int(np.ceil((k + 1) * confirmed)) > int(np.ceil(k * confirmed))
+            if asked:
+                found = objective.confirm(found)
         except SimulationFailure as failure:
             samples.append(Sample(errors, None, None, str(failure)))
             continue
@@ -160,6 +171,7 @@ def sample_spread(
                 moved,
                 found.fit.max_percent,
                 snapped=snapped(objective, found, evaluation, _STEPS_BACK),
+                confirmed=asked,
             )
         )
     return samples
@@ -217,7 +229,8 @@ def robustness(
 
     factors : multiples of the tolerance; number : samples for each Of each size: root mean square
     and worst joint's displacement, predicted and sampled; the fit's largest deviations; how many
-    samples failed, and how many snapped; `linear_error`, the part of the displacements that their
+    samples failed, how many snapped, and how many of them Exudyn was asked to confirm and did;
+    `linear_error`, the part of the displacements that their
     own prediction misses, of the samples that kept to the state.
     """
     sizes = []
@@ -231,6 +244,7 @@ def robustness(
             "predicted_rms_percent": predicted.rms_percent,
             "predicted_worst_percent": predicted.worst_percent,
             "samples": number,
+            "confirmed": sum(sample.confirmed for sample in found),
             "failed": number - len(found),
             "snapped": sum(sample.snapped for sample in found),
         }

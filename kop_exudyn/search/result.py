@@ -104,8 +104,8 @@ class KitResult:
         }
 
     def redeployment(self, number: int) -> dict[str, Any]:
-        """Where the assigned design's parts open into by themselves: fit, energy, and whether it's
-        the kept state.
+        """Where the assigned design's parts open into by themselves: fit, energy, whether it's the
+        kept state, and Exudyn's confirmation.
 
         {"failed": why} where that deployment (or the design) failed.
         """
@@ -124,6 +124,7 @@ class KitResult:
             "fit": fit_summary(design, target, opened.fit, opened.equilibria[role].state),
             "elastic_energy": energy,
             "energy_ratio": energy / self.references[number].energy,
+            "exudyn": opened.confirmations[role].to_dict() if opened.confirmations else None,
         }
 
     def to_dict(self) -> dict[str, Any]:

@@ -258,6 +258,8 @@ class Stages:
         q = self._realised(result.kit, result.assignment, np.concatenate(places)[self.dataset.free])
         secured = self.dataset.requiring(self.required)
         found = secured.redeploy(q, range(len(result.designs)))
+        opened = {n: at for n, at in found.items() if isinstance(at, Evaluation)}
+        found = {**found, **secured.confirm(opened)}
         return [found[n] for n in range(len(result.designs))]
 
     def to_parts(self, relaxed: StageResult) -> tuple[StageResult, StageResult]:

@@ -18,6 +18,7 @@ from kop_exudyn.analysis.tolerance import (
     shares_by_kind,
 )
 from kop_exudyn.errors import InputError, SimulationFailure
+from kop_exudyn.search import objective
 from kop_exudyn.search.objective import DesignObjective
 from kop_exudyn.structures.base import design_from_dict
 
@@ -59,6 +60,21 @@ def test_small_errors_agree_with_the_sensitivities(built):
     sampled = sampled_spread(samples, evaluation.fit.diagonal)
     # a dozen samples' own spread
     assert sampled.rms_percent == pytest.approx(first_order.rms_percent, rel=0.35)
+
+
+def test_a_share_of_the_samples_is_confirmed(built, monkeypatch):
+    """The others aren't, and say so; one that Exudyn refuses is a failure with its reason."""
+    design, evaluation = built
+    samples = sample_spread(design, evaluation, SMALL, 5, seed=3, confirmed=0.4)
+    assert [sample.confirmed for sample in samples] == [True, False, True, False, False]
+
+    def refused(*arguments, **options):
+        raise SimulationFailure("Exudyn refuses the state")
+
+    monkeypatch.setattr(objective, "confirm", refused)
+    samples = sample_spread(design, evaluation, SMALL, 5, seed=3, confirmed=0.4)
+    assert [sample.failed is None for sample in samples] == [False, True, False, True, True]
+    assert "Exudyn refuses" in samples[0].failed
 
 
 def test_the_linear_prediction_is_second_order_accurate(built):
