@@ -177,7 +177,7 @@ class CellParts:
             _round(at_plate, _LUG * t),
             *([_round(at_crossing, _DISC * t)] if with_disc else []),
         ])  # fmt: skip
-        shapes = [_outline(shape), Hole(at_plate, self.pin)]
+        shapes: list[Shape] = [_outline(shape), Hole(at_plate, self.pin)]
         if with_disc:
             reach, lock = (share * t for share in _LOCK)
             shapes.append(Hole(at_crossing, self.pin))
@@ -234,7 +234,7 @@ class CellParts:
             shapely.box(-(_TAB[1] + 0.25) * t, -_LUG * t, 0.0, 0.0),
             shapely.box(-_TAB[1] * t, 0.0, -_TAB[0] * t, t),
         ])  # fmt: skip
-        shapes = (
+        shapes: tuple[Shape, ...] = (
             _outline(shape),
             Hole(np.zeros(2), self.pin),
             Text(np.array([-1.6 * t, -0.38 * t]), 0.45 * t, "E"),

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import shapely
 
 from ..files.tables import write_csv
 from ..kit.kinds import PartKind, part_kind
@@ -124,7 +123,7 @@ def _totals_of_cells(cells: CellParts) -> list[dict[str, Any]]:
             for t in cells.templates()
             if (t.label == labels if labels else t.label not in ("P", "E"))
         ]
-        area = sum(t.count * shapely.Polygon(t.shapes[0].points).area for t in chosen)
+        area = sum(t.count * t.area for t in chosen)
         rows.append(
             {
                 "item": item,

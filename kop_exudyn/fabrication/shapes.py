@@ -109,6 +109,13 @@ class Template:
         return box_of(self.shapes)
 
     @property
+    def area(self) -> float:
+        """Within the outline, which is the first closed line; holes are not taken off."""
+        lines = (s for s in self.shapes if isinstance(s, Polyline) and s.closed)
+        x, y = next(lines).points.T
+        return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))
+
+    @property
     def size(self) -> np.ndarray:
         """(2,) width and height."""
         return np.ptp(self.box, axis=0)
