@@ -53,20 +53,22 @@ def find_crossings(curves: Sequence[Curve]) -> list[Crossing]:
 
 
 def near_crossings(curves: Sequence[Curve], reach: float) -> list[Crossing]:
-    """Crossings of different curves that go on straight beyond their ends by up to `reach`; their
-    stations there are negative, or larger than the length.
+    """Crossings of different curves near to an end of one of them, where curves go on straight
+    beyond their ends by up to `reach`; stations there are negative, or larger than the length.
 
     Curves that touch or cross themselves are passed over.
     """
     pieces = _Pieces(curves)
-    i, j = pieces.meeting(2 * reach)
+    lengths = np.array([curve.length for curve in curves])
+    closed = np.array([curve.closed for curve in curves])
+    rest = lengths[pieces.curve] - pieces.stations[:, 1]
+    at_end = ~closed[pieces.curve] & (np.minimum(pieces.stations[:, 0], rest) <= reach)
+    i, j = pieces.meeting(2 * reach, np.flatnonzero(at_end))
     apart = pieces.curve[i] != pieces.curve[j]
     i, j = i[apart], j[apart]
     if not len(i):
         return []
     a, b = pieces.curve[i], pieces.curve[j]
-    lengths = np.array([curve.length for curve in curves])
-    closed = np.array([curve.closed for curve in curves])
     s, t, gap, sine = _polish(curves, lengths, a, b, *_chord_crossing(pieces, i, j))
     good = _on(closed[a], lengths[a], s, reach) & _on(closed[b], lengths[b], t, reach)
     good &= (gap <= 1e-3 * TOLERANCE * size_of(curves)) & (np.abs(sine) > np.sin(_LEAST_ANGLE))
@@ -131,15 +133,22 @@ class _Pieces:
         )
         self.sags = np.concatenate([curve.sags for curve in curves])
 
-    def meeting(self, margin: float) -> tuple[np.ndarray, np.ndarray]:
+    def meeting(
+        self, margin: float, asked: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Pairs i < j of pieces whose boxes, which hold their pieces of curve, are within a margin
-        of each other."""
+        of each other; of all, or those of which one is asked for."""
         room = (self.sags + 0.5 * margin)[:, None]
         low, high = np.minimum(self.start, self.end) - room, np.maximum(self.start, self.end) + room
         boxes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
-        i, j = shapely.STRtree(boxes).query(boxes)
-        ahead = i < j
-        return i[ahead], j[ahead]
+        if asked is None:
+            i, j = shapely.STRtree(boxes).query(boxes)
+            ahead = i < j
+            return i[ahead], j[ahead]
+        n, j = shapely.STRtree(boxes).query(boxes[asked])
+        pairs = np.sort(np.stack([asked[n], j], axis=1), axis=1)
+        i, j = np.unique(pairs, axis=0).T
+        return i, j
 
 
 def _search(

@@ -227,6 +227,27 @@ class TestNetworks:
         assert [f.text for f in read.findings] == ["1 repeated points left out of a"]
 
 
+class TestLargeDrawings:
+    """Searches among all pairs of points, or of pieces, would take minutes and gigabytes here."""
+
+    def test_curves_of_thousands_of_points(self):
+        t = np.linspace(-0.1, 3.1, 3000)
+        curves = []
+        for k in range(4):
+            wave = k + 0.02 * np.sin(2 * t + k)
+            for x, y in ((t, wave), (wave, t)):
+                curves.append(DrawnCurve(np.stack([x, y, 0 * t], 1), False, f"lath {len(curves)}"))
+        read = drawn_network(Drawing(curves))
+        assert read.network.n_joints == 16 and len(read.entries) == 8
+
+    def test_a_net_of_edges(self):
+        stops = np.arange(26.0)
+        edges = [piece((a, k), (a + 1, k)) for k in stops for a in stops[:-1]]
+        edges += [piece((k, a), (k, a + 1)) for k in stops for a in stops[:-1]]
+        read = drawn_network(Drawing(edges))
+        assert len(read.entries) == 52 and read.network.n_joints == 26**2
+
+
 class TestCommand:
     def test_obj_to_design(self, obj, tmp_path, capsys):
         out = tmp_path / "design.json"
