@@ -30,7 +30,7 @@ class Effort:
 EFFORTS = {
     "quick": Effort(0, 0, 0, 1),
     "normal": Effort(3, 5, 2, 2),
-    "thorough": Effort(8, 20, 4, 5),
+    "thorough": Effort(8, 10, 8, 8),
 }
 
 

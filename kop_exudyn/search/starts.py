@@ -31,7 +31,9 @@ log = logging.getLogger(__name__)
 
 _DAMPINGS = (1e-3, 1e-5)  # of the models
 _SHAKEN = 0.05  # of the elements get any other part, at least two
-_PROMISING = 1.5  # times the lowest J built; starts above that rarely end lower
+# times the lowest J built: starts above that aren't optimised. Measured on three C-shells (12 + 5
+# parts): one that began at 1.9 times J of the relaxed designs' parts ended 17 % below these.
+_PROMISING = 3.0
 _NUMBERS = 100  # of rounds, at most, of each start: every SQP has a name of its own
 _SAME = 1e-6  # relative; starts whose predictions are that close are one
 

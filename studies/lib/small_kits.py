@@ -7,7 +7,7 @@ each. With four pieces and two parts there are 36 assignments that differ by mor
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from itertools import product
 from typing import Any
@@ -24,12 +24,17 @@ from kop_exudyn.scene.builder import SceneBuilder
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.objective import Weights
 from kop_exudyn.search.pool import DesignPool
+from kop_exudyn.search.problems import AssignedProblem
+from kop_exudyn.search.reassign import LocalModel
+from kop_exudyn.search.reassign import best_parts as best_model_parts
+from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.search.stages import Stages
 from kop_exudyn.structures.base import Design, Role, Target
 
 SECTION = np.array([1e5, 4e4, 4e4, 0.8, 1.0, 1.0])  # slender: EA L^2 / EI is about 1e5
+_DAMPING = 1e-3  # of the model that parts start from
 _SAME = 1e-3  # of J: optima that close are one
 
 
@@ -100,35 +105,44 @@ def assignments(n: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
             yield part, variant
 
 
-def compared(seed: int, effort: dict[str, Any] | None = None) -> dict[str, Any]:
+def compared(seed: int, efforts: Sequence[str] = ("normal",)) -> dict[str, Any]:
     """The search's J and the best of all assignments for one random strip and two parts.
 
-    effort : settings of the stages, default: the usual ones
+    efforts : of the search, see `StageSettings.effort`
 
-    Returns J of the search, of the best assignment, and of the direct and the second best one; the
-    optimum is the least of all that was found, the search's own result included.
+    Returns rows, one an effort: J of the search and of the best assignment, and others over that.
+    The optimum is the least of all that was found, the searches' own results included.
     """
     strip = strip_of(seed)
-    settings = StageSettings(**(effort or {}))
-    found = optimize_kit(
-        [strip], {"linear": 2}, settings=JobSettings(jobs=1, stages=settings, baselines=False)
-    )
+    results = {}
+    for effort in efforts:
+        settings = StageSettings(requirements=Requirements.none(), effort=effort)
+        results[effort] = optimize_kit(
+            [strip], {"linear": 2}, settings=JobSettings(jobs=1, stages=settings, baselines=False)
+        )
     values = sorted(_all_values(strip))
-    search = found.stages["assigned"].value
-    search = float("inf") if search is None else search
-    best = min(values[0], search)
-    return {
-        "seed": seed,
-        "pieces": strip.n_elements,
-        "assignments": len(values),
-        "J of the search": search,
-        "J of the best": best,
-        "ratio": search / best,
-        "found": bool(search <= best * (1 + _SAME)),
-        "better than all tried": bool(search < values[0] * (1 - _SAME)),
-        "second best ratio": next((v / best for v in values if v > best * (1 + _SAME)), None),
-        "direct ratio": (found.stages["direct"].value or float("inf")) / best,
-    }
+    searched = {e: _finite(found.stages["assigned"].value) for e, found in results.items()}
+    best = min(values[0], *searched.values())
+    rows = [
+        {
+            "seed": seed,
+            "effort": effort,
+            "assignments": len(values),
+            "J of the search": searched[effort],
+            "J of the best": best,
+            "ratio": searched[effort] / best,
+            "found": bool(searched[effort] <= best * (1 + _SAME)),
+            "better than all tried": bool(searched[effort] < values[0] * (1 - _SAME)),
+            "second best": next((v / best for v in values if v > best * (1 + _SAME)), None),
+            "direct": _finite(found.stages["direct"].value) / best,
+        }
+        for effort, found in results.items()
+    ]
+    return {"rows": rows}
+
+
+def _finite(value: float | None) -> float:
+    return float("inf") if value is None else value
 
 
 def _all_values(strip: Strip) -> list[float]:
@@ -137,17 +151,32 @@ def _all_values(strip: Strip) -> list[float]:
     with DesignPool([strip], 1) as pool:
         pool.prepare()
         dataset = Dataset.of_pool(pool, Weights.suiting([strip]))
-        stages = Stages(dataset, {"linear": 2}, StageSettings(assigned_tolerance=1e-6))
-        inputs = stages.inputs()
+        stages = Stages(
+            dataset,
+            {"linear": 2},
+            StageSettings(assigned_tolerance=1e-6, requirements=Requirements.none()),
+        )
+        derivatives = dataset.derivatives(stages.inputs(), hessian=True)
+        inputs = [d.evaluation for d in derivatives]
+        model = LocalModel.of(
+            derivatives, dataset.design_weights, dataset.split(dataset.scales()), _DAMPING
+        )
         elements = collect(dataset.groups, dataset.parameters)["linear"]
         limits = elements.kind.bounds(None)
         for part, variant in assignments(strip.n_elements):
             labels = Labels(part, variant, np.zeros(len(part)))
-            parts = best_parts(elements, np.full((2, 2), 0.1), labels, *limits)
+            nearest = Kit({"linear": best_parts(elements, np.full((2, 2), 0.1), labels, *limits)})
             assignment = Assignment(
                 tuple(dataset.groups), (part,), (variant,), len(dataset.parameters)
             )
-            built = stages.built_from(Kit({"linear": parts}), assignment, inputs, path_steps=3)
-            value = stages.assigned(built, "each").value if built.value is not None else None
+            # the parts start from where the elements are nearest to them, or the model lowest
+            kits = [nearest]
+            problem = AssignedProblem(dataset, nearest, assignment)
+            moved = best_model_parts(problem, problem.variables(inputs[0].q), model)
+            kits += [problem.kit_of(moved)] if moved is not None else []
+            starts = [stages.built_from(kit, assignment, inputs, path_steps=3) for kit in kits]
+            whole = [start for start in starts if start.value is not None]
+            built = min(whole, key=lambda start: start.value) if whole else None
+            value = stages.assigned(built, "each").value if built is not None else None
             found.append(float("inf") if value is None else value)
     return found
