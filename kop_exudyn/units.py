@@ -136,6 +136,16 @@ def with_unit(value: float, quantity: str, units: Units | None, digits: int = 4)
     return f"{value:.{digits}g} {unit_of(quantity, units)}"
 
 
+def in_millimetres(value: float, units: Units | None, digits: int = 3) -> str:
+    """A length as a workshop says it: in mm where the unit is known.
+
+    digits : significant ones that are shown
+    """
+    if units is None:
+        return with_unit(value, "length", units, digits)
+    return f"{1000 * units.metres * value:.{digits}g} mm"
+
+
 def common_units(named: Mapping[str, Units | None], what: str = "designs") -> Units | None:
     """The units that several files share; None where none of them names any.
 

@@ -80,22 +80,24 @@ class LoadedState:
 
 
 def loaded_state(
-    design: Design, unloaded: Equilibrium, case: LoadCase, engine: str = FAST
+    design: Design,
+    unloaded: Equilibrium,
+    case: LoadCase,
+    scene: Scene | None = None,
+    engine: str = FAST,
 ) -> LoadedState:
     """The state that the deployed design's equilibrium deforms into under a load case.
 
+    scene : of the unloaded state; default: the design's own
     engine : what solves for it, see `simulate`
     Raises InputError where a density is missing or the supports don't hold the design,
     SimulationFailure when it finds no equilibrium under all of the load, or Exudyn doesn't confirm
     it.
     """
-    case.check(len(design.joints), design.name)
-    role = design.fitted_role.name
-    supports = supports_of(design, unloaded, case)
-    held = _held(design.scene(role), unloaded, design.joints[supports])
+    supports, held = held_scene(design, unloaded, case, scene)
     found, scene, solve = unloaded, held, solver_of(engine)
     for share in np.linspace(0, 1, _STEPS + 1)[1:]:
-        scene = _loaded(design, held, unloaded, case, share)
+        scene = loaded_scene(design, held, unloaded, case, share)
         try:
             found = solve(system := System(scene), unloaded.q, found, unloaded.opening)
         except SimulationFailure as failure:
@@ -187,20 +189,30 @@ def _surround(points: np.ndarray, centre: np.ndarray) -> bool:
     return bool((sides[:, :2] @ centre + sides[:, 2] < 0).all())
 
 
-def _held(scene: Scene, unloaded: Equilibrium, bodies: np.ndarray) -> Scene:
-    """The scene in its unloaded state, held by these bodies' positions instead of any other
-    pins."""
+def held_scene(
+    design: Design, unloaded: Equilibrium, case: LoadCase, scene: Scene | None = None
+) -> tuple[np.ndarray, Scene]:
+    """The joints (k,) that hold a design under a load case, and its scene in the unloaded state,
+    held there instead of by any other pins.
+
+    scene : of the unloaded state; default: the design's own
+    Raises InputError as `supports_of`, and for joints that don't exist.
+    """
+    case.check(len(design.joints), design.name)
+    scene = design.scene(design.fitted_role.name) if scene is None else scene
+    supports = supports_of(design, unloaded, case)
+    bodies = design.joints[supports]
     pinned = scene.pinned.copy()
     pinned[: 6 * scene.n_bodies] = False
     free = np.setdiff1d((6 * bodies[:, None] + np.arange(3)).ravel(), scene.driven.dofs)
     pinned[free] = True
-    return replace(scene, pinned=pinned, initial=unloaded.state)
+    return supports, replace(scene, pinned=pinned, initial=unloaded.state)
 
 
-def _loaded(
+def loaded_scene(
     design: Design, scene: Scene, unloaded: Equilibrium, case: LoadCase, share: float
 ) -> Scene:
-    """The held scene with a share of the loads."""
+    """The held scene with a share of the loads, which may be more than all of them."""
     terms = list(scene.terms)
     if len(case.joints):
         terms.append(Scaled(DeadForces(design.joints[case.joints], case.forces), share))

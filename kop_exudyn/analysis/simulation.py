@@ -167,7 +167,7 @@ def simulate(design: Design, loads: LoadCase | None = None, engine: str = FAST) 
     joints = design.report_positions(confirmations[fitted].state)
     fit = TargetFitting(target)(confirmations[fitted].state.positions[design.joints])
     system = design.systems[fitted]
-    loaded = None if loads.empty else loaded_state(design, equilibria[fitted], loads, engine)
+    loaded = None if loads.empty else loaded_state(design, equilibria[fitted], loads, engine=engine)
     result = SimulationResult(
         design,
         system.n_unknowns,

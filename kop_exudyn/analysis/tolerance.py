@@ -19,10 +19,13 @@ from ..equilibrium.sensitivities import Sensitivities
 from ..errors import InputError, SimulationFailure
 from ..kit.kinds import part_kind
 from ..search.objective import DesignObjective, Evaluation
+from ..search.stage_results import SAME_STATE
 from ..structures.base import Design
 from ..structures.fitting import best_placement
 from .buckling import snapped
 
+_USUAL_SHARE, _LEAST_LENGTH = 1e-3, 2e-4  # of the median length; m
+_USUAL_ANGLE = np.radians(0.1)
 _STEPS_BACK = 3  # to the planned elements, which are near
 CONFIRMED = 0.1  # share of the samples that Exudyn confirms
 
@@ -135,19 +138,23 @@ def sample_spread(
     number: int,
     seed: int = 0,
     confirmed: float = CONFIRMED,
+    objective: DesignObjective | None = None,
 ) -> list[Sample]:
     """Re-solved equilibria for `number` sets of normally distributed errors; the same errors for
     the same seed.
 
     confirmed : share of the samples that Exudyn has to confirm, evenly spread, the first one among
         them
+    objective : the design's, where there is one already
 
     A set for which no equilibrium is found, or whose equilibrium Exudyn doesn't confirm, is a
-    sample with its reason.
+    sample with its reason. What ends where its sensitivities say has not snapped; anything else has
+    to come back when the errors are undone.
     """
     generator, deviations = np.random.default_rng(seed), tolerance.deviations(design)
     role = design.fitted_role.name
-    objective = DesignObjective(design)
+    objective = DesignObjective(design) if objective is None else objective
+    J = joint_jacobian(design, evaluation)
     wanted = evaluation.equilibria[role].state.positions[design.joints]
     samples = []
     for k in range(number):
@@ -165,12 +172,14 @@ def sample_spread(
             best_placement(joints, wanted, np.full(len(joints), 1 / len(joints))).apply(joints)
             - wanted
         )
+        missed = np.linalg.norm(moved - (J @ errors).reshape(-1, 3), axis=1).max()
+        away = missed > SAME_STATE * evaluation.fit.diagonal
         samples.append(
             Sample(
                 errors,
                 moved,
                 found.fit.max_percent,
-                snapped=snapped(objective, found, evaluation, _STEPS_BACK),
+                snapped=bool(away and snapped(objective, found, evaluation, _STEPS_BACK)),
                 confirmed=asked,
             )
         )
@@ -215,6 +224,15 @@ def relative_tolerance(design: Design, share: float, angle: float) -> Tolerance:
         if not part_kind(group.kind).angular
     ]
     return Tolerance(share * float(np.median(np.concatenate(lengths))) if lengths else 0.0, angle)
+
+
+def usual_tolerance(design: Design) -> Tolerance:
+    """What careful work keeps to: lengths within 0.1 % of the median, but not below 0.2 mm where
+    the design names its units, and angles within 0.1 degrees."""
+    found = relative_tolerance(design, _USUAL_SHARE, _USUAL_ANGLE)
+    if design.units is None:
+        return found
+    return Tolerance(max(found.length, _LEAST_LENGTH / design.units.metres), found.angle)
 
 
 def robustness(

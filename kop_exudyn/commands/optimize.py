@@ -163,9 +163,16 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="don't require that designs open by themselves, that stress keeps below the elastic "
         "limit, or either: to see what that costs",
     )
+    parser.add_argument(
+        "--samples",
+        type=not_negative,
+        metavar="N",
+        help="sets of workshop errors that each design's verdict is tried with; errors are data of "
+        "the study (default: 20)",
+    )
     add_json(
         parser,
-        "print JSON for other programs: the paths of page, result and kit, and how designs fit",
+        "print JSON for other programs: the verdict, the paths of page, result and kit, the fits",
     )
 
 
@@ -229,6 +236,8 @@ def run(args: argparse.Namespace) -> int:
         ),
         weights={**study.weights, **(args.weights or {})},
     )
+    if args.samples is not None:
+        study = replace(study, verdict=replace(study.verdict, samples=args.samples))
     designs = study.designs()
     result = optimize_and_report(
         designs,
@@ -242,6 +251,7 @@ def run(args: argparse.Namespace) -> int:
         overwrite=args.overwrite,
         progress=not args.quiet,
         kit=kit,
+        verdict=study.verdict,
     )
     failed = [
         design.name
@@ -256,11 +266,16 @@ def run(args: argparse.Namespace) -> int:
             "result": args.out / "result.json",
             "kit": args.out / "kit.json",
             "designs": [
-                {"name": design.name, **result.summary("assigned", n)}
+                {
+                    "name": design.name,
+                    **result.summary("assigned", n),
+                    "buildable": result.buildable[n],
+                }
                 for n, design in enumerate(result.designs)
             ],
+            "verdict": list(result.verdict),
         },
-        f"{page}\n",
+        "".join(f"{line}\n" for line in (*result.verdict, page)),
     )
     if failed:
         sys.stderr.write(f"kop: these designs can't be built from the kit: {', '.join(failed)}\n")
@@ -308,8 +323,15 @@ def _smallest(args: argparse.Namespace, study: Study, parts: dict[str, int]) -> 
     row = chosen.row(cost)
     report(
         args,
-        {"page": page, "kit": args.out / "kit.json", "within": kept, **row},
-        f"{page}\n{', '.join(f'{n} {kind}' for kind, n in chosen.sizes.items())} parts, largest "
+        {
+            "page": page,
+            "kit": args.out / "kit.json",
+            "within": kept,
+            "verdict": list(chosen.result.verdict),
+            **row,
+        },
+        "".join(f"{line}\n" for line in (*chosen.result.verdict, page))
+        + f"{', '.join(f'{n} {kind}' for kind, n in chosen.sizes.items())} parts, largest "
         f"deviation {chosen.max_percent:.3g} %\n",
     )
     if not kept:

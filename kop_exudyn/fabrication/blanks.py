@@ -197,7 +197,7 @@ class Blanks:
         if not (self.options.corners and len(angles) and len(sides)):
             return Corners()
         d, breadth = self.options.bolt_hole, self.board.breadth
-        setback = breadth / 2 * float(np.tan(min(angles.max(), _SHARPEST) / 2))
+        setback = setback_of(breadth, float(angles.max()))
         leg = min(_LEG * breadth, _LEG_SHARE * float(sides.min()))
         # where that is too long for the shortest side, `problems` says so
         leg = max(leg, setback + (2 * _EDGE + _APART) * d)
@@ -251,10 +251,15 @@ class Blanks:
             if count
         )
 
-    @cached_property
+    @property
     def problems(self) -> tuple[str, ...]:
         """What stands in the way of cutting these parts, one sentence each; empty where nothing
         does."""
+        return tuple(sentence for _, sentence in self.problems_by_part)
+
+    @cached_property
+    def problems_by_part(self) -> tuple[tuple[str | None, str], ...]:
+        """The `problems`, each with the label of the part that has it, None for those of all."""
         return tuple(self._problems())
 
     def check(self) -> None:
@@ -311,41 +316,63 @@ class Blanks:
         width = self.board.thickness * (1 + np.cos(angle)) / np.sin(angle)
         return float(width + self.options.clearance)
 
-    def _problems(self) -> Iterator[str]:
+    def _problems(self) -> Iterator[tuple[str | None, str]]:
         if self.cells is not None:
-            yield from self.cells.problems
+            yield from ((None, problem) for problem in self.cells.problems)
         if not self.strips:
             return
         corners, d, breadth = self.corners, self.options.bolt_hole, self.board.breadth
         if corners.bolts and self._angles.max() > _SHARPEST:
             yield (
+                None,
                 f"corners of {np.degrees(self._angles.max()):.0f} degrees are too sharp for strips "
-                "joined by a plate"
+                "joined by a plate",
             )
         if corners.bolts and 2 * _EDGE * d > breadth:
-            yield f"bolt holes of {d:g} mm are too wide for strips {breadth:g} mm broad"
+            yield None, f"bolt holes of {d:g} mm are too wide for strips {breadth:g} mm broad"
         for strip in self.strips:
             joint = strip.hole if strip.slot is None else strip.slot
             if strip.slot is None and 2 * _EDGE * joint > breadth:
                 yield (
+                    strip.label,
                     f"part {strip.label}: a joint hole of {joint:g} mm is too wide for strips "
-                    f"{breadth:g} mm broad"
+                    f"{breadth:g} mm broad",
                 )
             if corners.bolts:
                 room = min(strip.sides) - strip.slide - joint / 2 - d / 2
                 least = corners.bolts[-1] + (_EDGE - 0.5) * d
                 if room < least:
                     yield (
+                        strip.label,
                         f"part {strip.label}: its shorter side of {min(strip.sides):.1f} mm is "
                         f"too short for its holes: the plates' last bolt is "
                         f"{corners.bolts[-1]:.1f} mm from the corner, the joint takes "
-                        f"{joint / 2:.1f} mm"
+                        f"{joint / 2:.1f} mm",
                     )
         if self.board.on_edge:
             for kind, label, _, _, number in self._needed():
                 angle = self._crossings[kind.name][number] if has_joint(kind) else np.inf
                 if angle < _LEAST_CROSSING:
                     yield (
+                        label,
                         f"part {label} crosses another at {np.degrees(angle):.0f} degrees: too "
-                        "sharp for a slot"
+                        "sharp for a slot",
                     )
+
+
+def setback_of(breadth: float, angle: float) -> float:
+    """By how much strips so broad are sawn off before corners of an angle (rad); mm."""
+    return breadth / 2 * float(np.tan(min(angle, _SHARPEST) / 2))
+
+
+def least_side(breadth: float, angle: float, joint: float, options: CutOptions) -> float:
+    """The shortest side, from joint to corner point, that has room for all holes; mm.
+
+    breadth : of the strips
+    angle : of the sharpest corner, rad
+    joint : diameter of the joint's hole, or width of its slot
+    """
+    if not options.corners:
+        return joint / 2
+    room = (2 * _EDGE + _APART) * options.bolt_hole
+    return setback_of(breadth, angle) + room + joint / 2

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.verdict import VerdictSettings
 from ..errors import InputError
 from ..files.documents import check_envelope, check_range, check_schema
 from ..files.files import read_bytes
@@ -38,6 +39,7 @@ class Study:
     counts : how much each design counts, like `files`
     settings : of the stages
     baselines : whether the unrelaxed baseline is computed
+    verdict : tolerances that the designs have to forgive, and with how many samples
     """
 
     source: Path
@@ -47,6 +49,7 @@ class Study:
     counts: tuple[float, ...] = ()
     settings: StageSettings = StageSettings()
     baselines: bool = True
+    verdict: VerdictSettings = VerdictSettings()
 
     def designs(self) -> list[Design]:
         """The designs; raises InputError as `load_designs`."""
@@ -80,6 +83,7 @@ def load_study(path: str | Path, select: int | Sequence[str] | None = None) -> S
         tuple(counts[file] for file in files),
         study.settings,
         study.baselines,
+        study.verdict,
     )
 
 
@@ -118,6 +122,7 @@ def _from_file(path: Path) -> Study:
         tuple(counts.values()),
         StageSettings(**settings),
         data.get("baselines", True),
+        VerdictSettings(**data.get("tolerance", {})),
     )
 
 

@@ -172,24 +172,25 @@ def final_states(result: KitResult) -> dict[tuple[str, str, str], Equilibrium]:
     }
 
 
-def remarks(result: KitResult) -> list[str]:
+def remarks(result: KitResult, verdicts: bool = False) -> list[str]:
     """What a reader should know besides the figures: snaps, other states to open into, yield, how
-    SQPs ended."""
+    SQPs ended.
+
+    verdicts : whether verdicts on the designs tell already where they open into, and their stress
+    """
     stages = result.stages
     found = [
         f"{jump.design} snapped at {jump.fraction:.0%} of the way to its parts: "
         f"{jump.distance:.1%} of its size."
         for jump in stages["assigned"].jumps
     ]
+    own = [] if verdicts else list(enumerate(result.designs))
     found += [
         _about_opening(design.name, result.redeployment(n), result.summary("assigned", n))
-        for n, design in enumerate(result.designs)
+        for n, design in own
         if result.redeployed
     ]
-    found += [
-        _about_strength(design.name, result.summary("assigned", n))
-        for n, design in enumerate(result.designs)
-    ]
+    found += [_about_strength(design.name, result.summary("assigned", n)) for n, design in own]
     found += [_about_clustering(kind, gap) for kind, gap in result.clustering.items()]
     found = [remark for remark in found if remark]
     if "published" in result.stages and result.seconds:

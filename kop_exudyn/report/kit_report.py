@@ -3,10 +3,11 @@ shows them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..analysis.verdict import Buildable
 from ..drawing.style import save_figure
 from ..files.files import make_folder
 from ..io.kits import save_kit
@@ -20,18 +21,31 @@ from .history import draw_history
 from .kit_drawings import drawn_designs, final_states, histories, part_spaces, remarks, summary_rows
 from .page import Page
 from .parameters import draw_parameters
+from .verdicts import stopped, verdict_lines, verdict_rows
 from .viewer import save_viewer
 from .viewer_scenes import kit_scene
 
+_LEGEND = (
+    "Opens within: how far from the state shown the design ends that its assembly opens into, % of "
+    "the box diagonal. Utilisation: the largest equivalent stress over the elastic limit in all "
+    "states. Softest mode: its eigenvalue in the deployed state over the input design's. Spread: "
+    "root mean square displacement of the joint that moves most under the workshop's errors. "
+    "Snapped: of sets of such errors. A dash: not known."
+)
+
 
 def write_kit_report(
-    result: KitResult, folder: str | Path, extend: Callable[[Page], object] = lambda page: None
+    result: KitResult,
+    folder: str | Path,
+    verdicts: Sequence[Buildable] = (),
+    extend: Callable[[Page], object] = lambda page: None,
 ) -> Path:
     """Write result.json, kit.json, states.npz, figures, viewer.html and index.html; files of those
     names are replaced.
 
     result : of a search
     folder : made where it isn't there yet
+    verdicts : on its designs, which the page then begins with
     extend : adds sections of its own to the page, after those about the kit
 
     Returns the page's path. Raises InputError when a file can't be written.
@@ -49,10 +63,16 @@ def write_kit_report(
     for name, figure in figures.items():
         save_figure(figure, folder / name, overwrite=True)
     save_viewer(folder / "viewer.html", kit_scene(result), overwrite=True)
-    return _page(result, figures, extend).save(folder / "index.html", overwrite=True)
+    page = _page(result, figures, verdicts, extend)
+    return page.save(folder / "index.html", overwrite=True)
 
 
-def _page(result: KitResult, figures: dict, extend: Callable[[Page], object]) -> Page:
+def _page(
+    result: KitResult,
+    figures: dict,
+    verdicts: Sequence[Buildable],
+    extend: Callable[[Page], object],
+) -> Page:
     sizes = " and ".join(f"{count} {kind}" for kind, count in result.kit.sizes.items())
     elements = sum(design.n_elements for design in result.designs)
     designs = "a design" if len(result.designs) == 1 else f"{len(result.designs)} designs"
@@ -61,11 +81,17 @@ def _page(result: KitResult, figures: dict, extend: Callable[[Page], object]) ->
         if "kit" in result.settings
         else f"One kit of parts for {designs}"
     )
-    page = Page(
-        title,
+    about = (
         f"{sizes} parts realise the {elements} elements of "
-        f"{', '.join(d.name for d in result.designs)}.",
+        f"{', '.join(d.name for d in result.designs)}."
     )
+    if verdicts:
+        first, second = verdict_lines(verdicts, result.units)
+        page = Page(title, first)
+        page.text("\n\n".join([second] if _all_possible(verdicts) else _stops(verdicts)))
+        page.text(about)
+    else:
+        page = Page(title, about)
     page.links({"Turn the designs around in 3D": "viewer.html"})
     page.table(
         *summary_rows(result),
@@ -83,7 +109,9 @@ def _page(result: KitResult, figures: dict, extend: Callable[[Page], object]) ->
         "found, or no "
         "section or limit known.",
     )
-    page.text("\n\n".join(remarks(result)))
+    if verdicts:
+        page.section("Can they be built?").table(*verdict_rows(verdicts, result.units), _LEGEND)
+    page.text("\n\n".join(remarks(result, verdicts=bool(verdicts))))
     page.section("The designs").figure(
         figures["designs"],
         "Rods and joints at the best placement on the target; grey: the input design.",
@@ -116,6 +144,15 @@ def _page(result: KitResult, figures: dict, extend: Callable[[Page], object]) ->
         f"iterations in {result.wall_s:.0f} s.",
     )
     return page.details("Settings", result.settings).details("Versions and machine", environment())
+
+
+def _all_possible(verdicts: Sequence[Buildable]) -> bool:
+    return all(verdict.possible for verdict in verdicts)
+
+
+def _stops(verdicts: Sequence[Buildable]) -> list[str]:
+    """A sentence for each design that can't be built."""
+    return [stopped(verdict) for verdict in verdicts if not verdict.possible]
 
 
 def _how_used(result: KitResult) -> str:

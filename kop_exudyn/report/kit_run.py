@@ -6,11 +6,14 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from tqdm import tqdm
 from tqdm.contrib.logging import logging_redirect_tqdm
 
+from ..analysis.verdict import VerdictSettings
+from ..fabrication.limits import part_bounds
 from ..io.checkpoint import Job
 from ..io.run_folder import RunFolder
 from ..kit.parts import Kit
@@ -21,6 +24,7 @@ from ..search.settings import JobSettings
 from ..search.stage_results import StageEvent
 from ..structures.base import Design
 from .kit_report import write_kit_report
+from .verdicts import give_verdicts
 
 
 def optimize_and_report(
@@ -34,9 +38,13 @@ def optimize_and_report(
     resume: bool = False,
     overwrite: bool = False,
     progress: bool = False,
+    verdict: VerdictSettings = VerdictSettings(),
 ) -> KitResult:
-    """Find a kit for these designs; write checkpoints on the way, and results and a report in the
-    end.
+    """Find a kit for these designs; write checkpoints on the way, and results, a verdict on each
+    design and a report in the end.
+
+    Parts have sides long enough for their holes and corners that strips can be joined at, unless
+    the settings bound these kinds of parts otherwise, see `part_bounds`.
 
     Parameters
     ----------
@@ -46,6 +54,7 @@ def optimize_and_report(
     resume : go on from the checkpoints in `out`
     overwrite : replace what another job left in `out`
     progress : show accepted steps on standard error
+    verdict : tolerances and samples of the verdicts; their safety is that of the requirements
 
     Raises
     ------
@@ -54,6 +63,8 @@ def optimize_and_report(
     SimulationFailure
         when an input design can't be simulated
     """
+    if kit is None:
+        settings = within_workshop(designs, settings)
     check_request(designs, parts, kit, settings)
     job = described_job(designs, parts, kit, settings)
     if not inputs:
@@ -74,8 +85,18 @@ def optimize_and_report(
             observer=observe,
             announce=bar.set_description_str,
         )
-    write_kit_report(result, folder.path)
+        bar.set_description_str("verdicts")
+        verdict = replace(verdict, safety=settings.stages.requirements.safety)
+        verdicts = give_verdicts(result, verdict, settings.jobs)
+    write_kit_report(result, folder.path, verdicts)
     return result
+
+
+def within_workshop(designs: Sequence[Design], settings: JobSettings) -> JobSettings:
+    """The settings with bounds that keep parts long enough for their holes, see `part_bounds`, for
+    kinds that they bound in no other way."""
+    bounds = {**part_bounds(designs), **(settings.stages.bounds or {})}
+    return replace(settings, stages=replace(settings.stages, bounds=bounds or None))
 
 
 @contextmanager

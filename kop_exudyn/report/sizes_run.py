@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from ..analysis.sizes import KitCost, SizedKit, smallest_kit, trade_off
 from ..analysis.tradeoff import knee
+from ..analysis.verdict import VerdictSettings
 from ..drawing.style import save_figure
 from ..files.json_files import plain, write_json
 from ..files.tables import write_csv
@@ -26,6 +27,7 @@ from .kit_report import write_kit_report
 from .kit_run import progress_bar
 from .page import Page
 from .tradeoff_drawing import draw_tradeoff
+from .verdicts import give_verdicts
 
 _EXPLAINED = (
     "Deviations of the designs as they open, in % of their boxes' diagonals: the largest of all "
@@ -90,7 +92,9 @@ def smallest_and_report(
             page.section("Other sizes", text)
             _add_table(page, rows, figure)
 
-        write_kit_report(chosen.result, run.folder.path, extend)
+        asked_of = VerdictSettings(safety=settings.stages.requirements.safety)
+        verdicts = give_verdicts(chosen.result, asked_of, settings.jobs)
+        write_kit_report(chosen.result, run.folder.path, verdicts, extend)
     return chosen, found is not None
 
 

@@ -154,6 +154,52 @@ def drilled(section: Section, diameter: float) -> Section:
     return replace(section, cut=left)
 
 
+def thickness_of(section: Section) -> float:
+    """The smaller one of a section's two extents, length: that of the board it is cut from."""
+    return float(np.ptp(section.outline, axis=0).min())
+
+
+def hole_of(section: Section) -> float | None:
+    """Diameter of the hole at a rectangle's joints, None where there is none."""
+    if section.cut is None or section.cut.centre != (0.0, 0.0):
+        return None
+    width, height = np.ptp(section.outline, axis=0)
+    return float(width - section.cut.area / height)
+
+
+def thickened(section: Section, share: float) -> Section:
+    """The section cut from a board `share` times as thick: a rectangle's smaller side grows, its
+    joints are cut as before; what is as broad as thick grows in both directions.
+
+    Torsion of other sections than rectangles is taken to grow as that of thin strips.
+    Raises InputError for a share that is not positive.
+    """
+    _positive("share", share)
+    extents = np.ptp(section.outline, axis=0)
+    if np.isclose(*extents):
+        scales = np.array([share, share])
+    else:
+        scales = np.where(extents == extents.min(), share, 1.0)
+    y, z = (float(scale) for scale in scales)
+    if len(section.outline) == 4 and np.isclose(section.area, extents.prod()):
+        whole = rectangle(*(float(side) for side in extents * scales))
+        if section.cut is None:
+            return whole
+        if section.cut.centre != (0.0, 0.0):
+            return half_lapped(whole)
+        return drilled(whole, hole_of(section) or 0.0)
+    return replace(
+        section,
+        area=section.area * y * z,
+        inertia_y=section.inertia_y * y * z**3,
+        inertia_z=section.inertia_z * z * y**3,
+        torsion=section.torsion * (share**4 if y == z else share**3),
+        outline=section.outline * scales,
+        torsion_modulus=section.torsion_modulus * share,
+        cut=None if section.cut is None else thickened(section.cut, share),
+    )
+
+
 def circle(radius: float) -> Section:
     """Solid circle. Shear factor 9/10, the classical energy value of a circle."""
     _positive("section.radius", radius)

@@ -43,6 +43,9 @@ class KitResult:
         of the input elements
     seconds : wall time of "search" (both stages) and, where that was asked for, "published"
     tried : starts of the assigned stage, and what came of them
+    buildable : by design, whether it can be built from the kit and what stops it, as plain data;
+        empty where that was not looked at
+    verdict : the same in words: which can be built, and what stops the others
     equilibria, newton_iterations : solved in all
     settings : as given, for the record
     """
@@ -61,6 +64,8 @@ class KitResult:
     clustering: Mapping[str, ClusteringGap] = field(default_factory=dict)
     tried: Sequence[TriedStart] = ()
     seconds: dict[str, float] = field(default_factory=dict)
+    buildable: Sequence[Mapping[str, Any]] = ()
+    verdict: Sequence[str] = ()
 
     @property
     def units(self) -> Units | None:
@@ -131,6 +136,7 @@ class KitResult:
         """As result.json has it."""
         return {
             "units": None if self.units is None else self.units.to_dict(),
+            **({"verdict": list(self.verdict)} if self.verdict else {}),
             "designs": [
                 {
                     "name": design.name,
@@ -138,6 +144,7 @@ class KitResult:
                     "input": self.input_summary(n),
                     **{stage: self.summary(stage, n) for stage in STAGES if stage in self.stages},
                     **({"redeployed": self.redeployment(n)} if self.redeployed else {}),
+                    **({"buildable": dict(self.buildable[n])} if self.buildable else {}),
                 }
                 for n, design in enumerate(self.designs)
             ],

@@ -21,7 +21,7 @@ from ..kit.groups import ElementGroup
 from ..plugins import Registry
 from ..units import Units, units_from_dict
 from .hardware import CellHardware
-from .loads import LoadCase, load_case_from_dict
+from .loads import LoadCase, load_cases_from_dict
 
 if TYPE_CHECKING:
     from ..equilibrium.equilibria import Equilibrium, Start
@@ -96,6 +96,8 @@ class Design(ABC):
     free_scale: float = 1.0
     # What acts on the deployed design; the search for a kit is for the unloaded one.
     loads: LoadCase = LoadCase()
+    # All cases in which something acts: what the design has to carry, one after the other.
+    load_cases: tuple[LoadCase, ...] = ()
     # Of all its numbers; None where its file names none.
     units: Units | None = None
     # (3,) where the scenes' coordinates begin in those of the design's own file: zero, unless it
@@ -280,9 +282,12 @@ def design_from_dict(data: Mapping[str, Any], source: str = "design") -> Design:
     if "units" in data:
         design.units = units_from_dict(data["units"])
     design.origin = design.middle + np.array(data.get("origin", (0.0, 0.0, 0.0)), float)
-    if "loads" in data or "supports" in data:
-        design.loads = load_case_from_dict(data)
-        design.loads.check(len(design.joints), source)
+    cases = load_cases_from_dict(data)
+    for case in cases:
+        case.check(len(design.joints), source)
+    if cases:
+        design.loads = cases[0]
+        design.load_cases = tuple(case for case in cases if not case.empty)
     return design
 
 

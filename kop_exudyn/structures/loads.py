@@ -1,9 +1,10 @@
-"""What acts on a deployed design: gravity, forces on its joints, and where it is held."""
+"""What acts on a deployed design, case by case: gravity, forces on its joints, where it is held,
+and what it has to keep to under them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,32 @@ def hold_in_place(points: np.ndarray) -> bool:
 
 
 @dataclass(frozen=True)
+class DeflectionLimit:
+    """How far a loaded design may move: as a length, or the span between supports divided by a
+    number; the smaller one where both are given.
+
+    absolute : in the design's unit of length, or None
+    span_over : N of span / N, or None
+    """
+
+    absolute: float | None = None
+    span_over: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("absolute", "span_over"):
+            value = getattr(self, name)
+            if value is not None and not (np.isfinite(value) and value > 0):
+                raise InputError(
+                    "must be a positive number", field=f"deflection.{name}", value=value
+                )
+
+    def allowed(self, span: float) -> float:
+        """The largest deflection, for a span; inf where nothing limits it."""
+        own = np.inf if self.absolute is None else self.absolute
+        return float(min(own, np.inf if self.span_over is None else span / self.span_over))
+
+
+@dataclass(frozen=True)
 class LoadCase:
     """Loads on the deployed state, in the design's own axes; lists become arrays.
 
@@ -30,12 +57,19 @@ class LoadCase:
     joints (m,), forces (m, 3) : forces that keep their direction, and the joints that they act on
         (from 0)
     supports : (k,) joints that stay where they are, or None: those that the analysis chooses
+    name : as results have it
+    factor : that strength and stability are asked for: loads times this. Deflections are those
+        under the loads themselves
+    deflection : how far the design may move under them
     """
 
     gravity: np.ndarray | None = None
     joints: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
     forces: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     supports: np.ndarray | None = None
+    name: str = "loads"
+    factor: float = 1.0
+    deflection: DeflectionLimit = DeflectionLimit()
 
     def __post_init__(self) -> None:
         for name, kind in (
@@ -49,6 +83,13 @@ class LoadCase:
                     object.__setattr__(self, name, np.asarray(value, kind))
                 except (OverflowError, TypeError, ValueError) as error:
                     raise InputError(f"expected numbers: {error}", field=f"loads.{name}") from None
+        if not (np.isfinite(self.factor) and self.factor > 0):
+            raise InputError("must be a positive number", field="loads.factor", value=self.factor)
+
+    def times(self, factor: float) -> LoadCase:
+        """The same case with all loads multiplied."""
+        gravity = None if self.gravity is None else factor * self.gravity
+        return replace(self, gravity=gravity, forces=factor * self.forces)
 
     @property
     def empty(self) -> bool:
@@ -71,16 +112,39 @@ class LoadCase:
                 )
 
 
-def load_case_from_dict(data: Mapping[str, Any]) -> LoadCase:
-    """The loads of a design file's content: fields "loads" and "supports", as design.schema.json
-    describes them."""
-    loads = data.get("loads", {})
-    points = loads.get("points", [])
-    gravity = np.array(loads["gravity"], float) if "gravity" in loads else None
+def load_cases_from_dict(data: Mapping[str, Any]) -> tuple[LoadCase, ...]:
+    """The load cases of a design file's content: fields "loads" and "supports" for one case, the
+    field "load_cases" for several, as design.schema.json describes them.
+
+    The first one may have supports alone, for loads that come later. A case of the list that names
+    no supports has those of the design. Raises InputError for two cases of one name, or where
+    nothing acts in a case of the list.
+    """
     supports = data.get("supports")
+    cases = []
+    if "loads" in data or supports is not None:
+        cases = [_case(data.get("loads", {}), supports, "loads")]
+    for number, entry in enumerate(data.get("load_cases", ())):
+        case = _case(entry, supports, entry.get("name", f"case {number + 1}"))
+        if case.name in {other.name for other in cases}:
+            raise InputError(
+                "two load cases have this name", field=f"load_cases[{number}].name", value=case.name
+            )
+        if case.empty:
+            raise InputError("nothing acts in this load case", field=f"load_cases[{number}]")
+        cases.append(case)
+    return tuple(cases)
+
+
+def _case(loads: Mapping[str, Any], supports: Any, name: str) -> LoadCase:
+    points = loads.get("points", [])
+    held = loads.get("supports", supports)
     return LoadCase(
-        gravity,
-        [point["joint"] for point in points],
+        loads.get("gravity"),
+        np.array([point["joint"] for point in points], int),
         np.array([point["force"] for point in points], float).reshape(-1, 3),
-        supports,
+        held,
+        name,
+        float(loads.get("factor", 1.0)),
+        DeflectionLimit(**loads.get("deflection", {})),
     )

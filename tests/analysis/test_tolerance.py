@@ -1,6 +1,7 @@
 """Fabrication errors: sensitivities against re-solved equilibria, on a C-shell of four by four
 rods."""
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -16,11 +17,13 @@ from kop_exudyn.analysis.tolerance import (
     sample_spread,
     sampled_spread,
     shares_by_kind,
+    usual_tolerance,
 )
 from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.search import objective
 from kop_exudyn.search.objective import DesignObjective
 from kop_exudyn.structures.base import design_from_dict
+from kop_exudyn.units import Units
 
 SMALL = Tolerance(length=1e-4, angle=1e-4)  # of spans of 1
 
@@ -139,7 +142,32 @@ def test_samples_that_snapped_are_counted_and_not_compared_with_the_prediction(b
     tolerance = relative_tolerance(design, 1e-4, 1e-4)
     (kept,) = robustness(design, evaluation, tolerance, (1,), 2)["sizes"]
     monkeypatch.setattr("kop_exudyn.analysis.tolerance.snapped", lambda *arguments: True)
+    # nothing is taken to be where its sensitivities say, so that every sample is led back
+    monkeypatch.setattr("kop_exudyn.analysis.tolerance.SAME_STATE", -1.0)
     (lost,) = robustness(design, evaluation, tolerance, (1,), 2)["sizes"]
     assert kept["snapped"] == 0 and lost["snapped"] == 2
     assert "linear_error" in kept and "linear_error" not in lost
     assert lost["sampled_rms_percent"] == kept["sampled_rms_percent"]
+
+
+def test_what_ends_where_it_is_predicted_is_not_led_back(built, monkeypatch):
+    def never(*arguments):
+        raise AssertionError
+
+    monkeypatch.setattr("kop_exudyn.analysis.tolerance.snapped", never)
+    design, evaluation = built
+    assert not any(s.snapped for s in sample_spread(design, evaluation, SMALL, 2))
+
+
+def test_usual_errors_are_a_fifth_of_a_millimetre_at_least(built):
+    design, _ = built
+    lengths = np.concatenate(
+        [design.parameters[g.indices].ravel() for g in design.groups if g.kind == "linear"]
+    )
+    unnamed = usual_tolerance(design)
+    assert unnamed.length == pytest.approx(1e-3 * np.median(lengths))
+    assert unnamed.angle == pytest.approx(np.radians(0.1))
+    for unit, expected in (("mm", 0.2), ("m", 1e-3 * np.median(lengths))):
+        other = copy(design)
+        other.units = Units(unit)
+        assert usual_tolerance(other).length == pytest.approx(expected)

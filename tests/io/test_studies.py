@@ -6,6 +6,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from kop_exudyn.analysis.verdict import VerdictSettings
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.datasets import load_designs, select_files
 from kop_exudyn.io.studies import load_study
@@ -54,6 +55,9 @@ seed = 3
 hessian = "bfgs"
 bounds.linear = {lower = 0.1, upper = [2, 3]}
 bounds.angular = {upper = 1.5}
+[tolerance]
+length = 0.001
+samples = 100
 """)
     )
     assert names(found.files) == ["two", "one", "four", "three"] and found.counts == (
@@ -68,6 +72,7 @@ bounds.angular = {upper = 1.5}
     assert settings.relaxed_steps == StageSettings().relaxed_steps
     np.testing.assert_array_equal(settings.bounds["linear"][1], [2, 3])
     assert settings.bounds["linear"][0] == 0.1 and settings.bounds["angular"] == (-np.inf, 1.5)
+    assert found.verdict == VerdictSettings(length=0.001, samples=100)
     designs = found.designs()
     assert [design.name for design in designs] == ["two", "one", "more four", "more three"]
     job = found.job_settings(designs, 2)
@@ -119,6 +124,9 @@ def test_the_schema_knows_all_settings(repository):
     assert set(schema["properties"]["weights"]["properties"]) == {
         field.name for field in fields(Weights)
     } - {"others"}
+    assert set(schema["properties"]["tolerance"]["properties"]) == {
+        field.name for field in fields(VerdictSettings)
+    } - {"safety"}  # which is the requirements'
 
 
 DESIGNS = 'designs = ["designs"]\n'

@@ -344,7 +344,7 @@ class Umbrella(Design):
             "deployment": self.deployment,
         }
         design = Umbrella(self.name, mesh, **(options | changes))
-        design.loads = self.loads
+        design.loads, design.load_cases = self.loads, self.load_cases
         return design
 
 

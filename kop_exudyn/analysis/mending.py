@@ -1,0 +1,193 @@
+"""What stops a design from being built, and what would help: a thinner or thicker section, tighter
+work, less load. What is said to help has been computed for the design's own elements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..equilibrium.equilibria import Equilibrium
+from ..errors import SimulationFailure
+from ..scene.scene import Scene
+from ..search.objective import DesignObjective, Evaluation
+from ..search.stage_results import SAME_STATE
+from ..structures.base import Design
+from ..structures.strength import design_strength, materials_of, rod_strength
+from ..structures.thickness import board_of, keeping_limit
+from ..units import in_millimetres
+from .load_check import LoadCheck, carrying_thickness
+from .tolerance import Tolerance, sample_spread
+
+_ROUNDING = 1e-6  # of the limit: a search that keeps to it may end on it
+_HALVINGS = 3  # of the tolerance, until nothing snaps
+
+
+@dataclass(frozen=True)
+class Stop:
+    """One reason why a design can't be built.
+
+    cause : "not found", "opening", "stress", "tolerance", "load" or "fabrication"
+    why : in words, without the design's name
+    helps : what would mend it, in words; None where nothing is known
+    """
+
+    cause: str
+    why: str
+    helps: str | None
+
+    def to_dict(self) -> dict[str, str | None]:
+        return {"cause": self.cause, "why": self.why, "helps": self.helps}
+
+    def __str__(self) -> str:
+        return self.why if self.helps is None else f"{self.why} ({self.helps})"
+
+
+def about_opening(
+    opened: Evaluation | SimulationFailure, moved_percent: float | None
+) -> list[Stop]:
+    """Whether the assembly opens into the state shown.
+
+    moved_percent : how far from it it ends, % of the box diagonal
+    """
+    helps = "more parts, or a thinner section, leave it fewer shapes to open into"
+    if isinstance(opened, SimulationFailure):
+        return [Stop("opening", f"does not open from its assembly: {opened}", helps)]
+    if moved_percent is not None and moved_percent > 100 * SAME_STATE:
+        why = f"opens into another shape, {moved_percent:.2g} % of its size from the one shown"
+        return [Stop("opening", why, helps)]
+    return []
+
+
+def about_stress(
+    design: Design,
+    states: Mapping[str, tuple[Scene, Equilibrium]],
+    inputs: Mapping[str, Equilibrium],
+    safety: float = 1.0,
+) -> tuple[dict[str, float | None], list[Stop]]:
+    """Utilisation by state; and whether it keeps to the limit, and which section would.
+
+    states : by name, those that a builder sees, with their scenes
+    inputs : by role, equilibria of the design as given
+    safety : factor by which the elastic limit is divided
+    """
+    materials = materials_of(design)
+    utilisation = {
+        name: rod_strength(scene, state, materials).largest
+        for name, (scene, state) in states.items()
+    }
+    known = {name: value for name, value in utilisation.items() if value is not None}
+    if not known or safety * max(known.values()) <= 1 + _ROUNDING:
+        return utilisation, []
+    worst = max(known, key=lambda name: known[name])
+    limit = "its elastic limit" if safety == 1 else f"its elastic limit over {safety:g}"
+    why = f"stressed to {100 * safety * known[worst]:.0f} % of {limit} ({worst} state)"
+    as_given = [found.largest for found in design_strength(design, inputs).values()]
+    own = max((value for value in as_given if value is not None), default=0.0)
+    if safety * own > 1:
+        why += f", and the design as given to {100 * safety * own:.0f} %"
+    beyond = [states[name] for name, value in known.items() if value > 0.5 * known[worst]]
+    share = keeping_limit(beyond, materials, 1 / safety)
+    if share is None:
+        helps = "no thickness near its own keeps the limit: open it less, or bend it less"
+    else:
+        helps = f"{_section(design, share)} would keep it with the same parts"
+    return utilisation, [Stop("stress", why, helps)]
+
+
+def about_tolerance(
+    objective: DesignObjective,
+    kept: Evaluation,
+    tolerance: Tolerance,
+    snapped: int,
+    samples: int,
+    seed: int = 0,
+) -> list[Stop]:
+    """What to say where errors of the workshop make a design snap.
+
+    tolerance : with which so many of the samples snapped
+    seed : of these samples
+    """
+    design = objective.design
+    why = (
+        f"snaps into another shape in {snapped} of {samples} samples with errors of "
+        f"{_errors(design, tolerance)}"
+    )
+    for halving in range(1, _HALVINGS + 1):
+        smaller = tolerance.scaled(0.5**halving)
+        found = sample_spread(design, kept, smaller, samples, seed, objective=objective)
+        if not any(sample.snapped or sample.failed for sample in found):
+            helps = f"none with errors of {_errors(design, smaller)}; or more parts"
+            return [Stop("tolerance", why, helps)]
+    return [Stop("tolerance", why, "even an eighth of these errors is too much; more parts help")]
+
+
+def about_loads(
+    design: Design, deployed: Equilibrium, checks: Sequence[LoadCheck], safety: float = 1.0
+) -> list[Stop]:
+    """Whether each load case is carried, and what would carry it.
+
+    deployed : the equilibrium without loads
+    """
+    found = []
+    for check in checks:
+        if check.carried(safety):
+            continue
+        why = "; ".join(_failing(design, check, safety))
+        helps = _carrying(design, deployed, check, safety)
+        found.append(Stop("load", f"{check.case.name}: {why}", helps))
+    return found
+
+
+def _failing(design: Design, check: LoadCheck, safety: float) -> list[str]:
+    found = []
+    if not check.stable:
+        found.append(
+            f"gives way at {check.critical:.2g} times the load, {check.case.factor:g} is asked for"
+        )
+    elif check.failed is not None:
+        found.append(check.failed)
+    if check.loaded is not None and not check.stiff:
+        moved, allowed = (
+            in_millimetres(value, design.units) for value in (check.deflection, check.allowed)
+        )
+        found.append(f"deflects by {moved}, {allowed} is allowed")
+    used = check.utilisation
+    if used is not None and safety * used > 1:
+        found.append(f"stressed to {100 * safety * used:.0f} % of its elastic limit")
+    return found
+
+
+def _carrying(design: Design, deployed: Equilibrium, check: LoadCheck, safety: float) -> str:
+    """What would carry the load."""
+    thicker = carrying_thickness(design, deployed, check.case, safety)
+    if thicker is None:
+        return "not even four times the thickness carries it: more supports, or less load"
+    share, used = thicker
+    helps = f"{_section(design, share)} would carry it"
+    if used is not None and safety * used > 1:
+        helps = (
+            f"{_section(design, share)} would be stiff enough, but stressed to "
+            f"{100 * safety * used:.0f} % of its elastic limit: more supports, less load, or a "
+            "flatter shape"
+        )
+    return helps
+
+
+def _section(design: Design, share: float) -> str:
+    """A section of another thickness, beside the present one."""
+    thickness = board_of(design)
+    if thickness is None:
+        return f"sections {share:.2g} times as thick"
+    wanted, present = (
+        in_millimetres(value, design.units) for value in (share * thickness, thickness)
+    )
+    return f"a section {wanted} instead of {present} thick"
+
+
+def _errors(design: Design, tolerance: Tolerance) -> str:
+    return (
+        f"{in_millimetres(tolerance.length, design.units, 2)} and "
+        f"{np.degrees(tolerance.angle):.2g} degrees"
+    )

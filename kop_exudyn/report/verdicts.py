@@ -1,0 +1,170 @@
+"""Verdicts on the designs of a kit, and their words: which can be built, and what stops the
+others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..analysis.verdict import Buildable, VerdictSettings, judge
+from ..errors import SimulationFailure
+from ..fabrication.limits import cutting_problems
+from ..search.objective import Weights
+from ..search.pool import DesignPool
+from ..search.result import KitResult
+from ..units import Units, in_millimetres, unit_of
+
+_MOST_STOPS = 2  # of a design are named in its line
+
+
+def kit_verdicts(
+    result: KitResult, settings: VerdictSettings = VerdictSettings(), jobs: int = 1
+) -> list[Buildable]:
+    """Whether each design of a result can be built from its kit.
+
+    settings : tolerances, samples, safety
+    jobs : processes
+    """
+    kept, opened = result.stages["assigned"].designs, result.redeployed
+    calls = {n: (kept[n], opened[n] if opened else None, settings) for n in range(len(kept))}
+    with DesignPool(result.designs, jobs) as pool:
+        pool.references = list(result.references)
+        found = pool.map(judge, Weights(), calls)
+    verdicts = []
+    for n, problems in enumerate(cutting_problems(result)):
+        verdict = found[n]
+        if isinstance(verdict, SimulationFailure):
+            raise verdict
+        verdicts.append(verdict.with_parts(problems))
+    return verdicts
+
+
+def give_verdicts(
+    result: KitResult, settings: VerdictSettings = VerdictSettings(), jobs: int = 1
+) -> list[Buildable]:
+    """The verdicts on a result's designs, which the result then tells as data and in words; see
+    `kit_verdicts`."""
+    verdicts = kit_verdicts(result, settings, jobs)
+    result.buildable = [one.to_dict() for one in verdicts]
+    result.verdict = verdict_lines(verdicts, result.units)
+    return verdicts
+
+
+def verdict_lines(verdicts: Sequence[Buildable], units: Units | None = None) -> tuple[str, str]:
+    """Two lines: which designs can be built from their kit; what stops the others, and what would
+    help, or else what was looked at.
+
+    units : of the designs
+    """
+    can = [verdict.design for verdict in verdicts if verdict.possible]
+    not_ = [verdict for verdict in verdicts if not verdict.possible]
+    if not not_:
+        some = {1: "The design", 2: "Both designs"}.get(len(can), f"All {len(can)} designs")
+        return f"{some} can be built from this kit.", _margins(verdicts, units)
+    names = _listed([verdict.design for verdict in not_])
+    if can:
+        first = f"{_listed(can)} can be built from this kit, {names} can't."
+    else:
+        first = f"{names} can't be built from this kit."
+    return first, " ".join(stopped(verdict) for verdict in not_)
+
+
+def stopped(verdict: Buildable) -> str:
+    """What stops a design, in one sentence."""
+    some = "; ".join(map(str, verdict.stops[:_MOST_STOPS]))
+    more = len(verdict.stops) - _MOST_STOPS
+    return f"{verdict.design}: {some}{f'; and {more} more' if more > 0 else ''}."
+
+
+def verdict_rows(
+    verdicts: Sequence[Buildable], units: Units | None = None
+) -> tuple[list[str], list[list[Any]]]:
+    """Headings and rows of a table of all verdicts.
+
+    units : of the designs
+    """
+    loaded = any(verdict.loads for verdict in verdicts)
+    headings = [
+        "design",
+        "can be built",
+        "opens within, %",
+        "utilisation",
+        "softest mode",
+        "spread, %",
+        "snapped",
+        "95 % within, %",
+        *(
+            ["worst load", f"deflection, {unit_of('length', units)}", "critical factor"]
+            if loaded
+            else []
+        ),
+        "parts to cut",
+    ]
+    rows = []
+    for verdict in verdicts:
+        kept = verdict.forgiveness
+        rows.append(
+            [
+                verdict.design,
+                "yes" if verdict.possible else "no",
+                verdict.moved_percent,
+                verdict.largest,
+                verdict.softest,
+                None if kept is None else kept.spread_percent,
+                None if kept is None else f"{kept.snapped} of {kept.samples}",
+                None if kept is None else kept.max_percent_p95,
+                *(_worst_load(verdict) if loaded else []),
+                _cutting(verdict),
+            ]
+        )
+    return headings, rows
+
+
+def _worst_load(verdict: Buildable) -> list[Any]:
+    """Name, deflection and critical factor of the load case that is nearest to its limits."""
+    if not verdict.loads:
+        return [None, None, None]
+    worst = min(verdict.loads, key=lambda check: check.critical / check.case.factor)
+    deflection = None if np.isnan(worst.deflection) else worst.deflection
+    factor = f"over {worst.critical:.3g}" if worst.beyond else f"{worst.critical:.3g}"
+    return [worst.case.name, deflection, factor]
+
+
+def _cutting(verdict: Buildable) -> str | None:
+    if verdict.fabrication is None:
+        return None
+    return f"{len(verdict.fabrication)} problems" if verdict.fabrication else "fine"
+
+
+def _margins(verdicts: Sequence[Buildable], units: Units | None) -> str:
+    """What was looked at, and how far from a limit it is."""
+    found = []
+    moved = [v.moved_percent for v in verdicts if v.moved_percent is not None]
+    if moved:
+        found.append("opened from the assembly they end in the shape shown")
+    used = [v.largest for v in verdicts if v.largest is not None]
+    if used:
+        found.append(f"stress is at most {100 * max(used):.0f} % of the elastic limit")
+    kept = [v.forgiveness for v in verdicts if v.forgiveness is not None]
+    if any(one.samples for one in kept):
+        worst = max(kept, key=lambda one: one.tolerance.length)
+        errors = (
+            f"{in_millimetres(worst.tolerance.length, units, 2)} and "
+            f"{np.degrees(worst.tolerance.angle):.2g} degrees"
+        )
+        found.append(
+            f"{sum(one.snapped for one in kept)} of {sum(one.samples for one in kept)} samples "
+            f"with errors of {errors} snap"
+        )
+    if any(verdict.loads for verdict in verdicts):
+        found.append("all load cases are carried")
+    if all(verdict.fabrication is not None for verdict in verdicts):
+        found.append("their parts have room for their holes")
+    sentence = ", ".join(found)
+    return f"{sentence[:1].upper()}{sentence[1:]}." if sentence else ""
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

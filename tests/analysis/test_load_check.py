@@ -1,0 +1,163 @@
+"""Load cases: the critical factor against the arc-length path, limits on deflection, and the
+thickness that carries a load."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from kop_exudyn.analysis.load_check import carrying_thickness, check_load, critical_factor
+from kop_exudyn.analysis.loading import held_scene
+from kop_exudyn.equilibrium.path import PathOptions, trace
+from kop_exudyn.errors import InputError
+from kop_exudyn.scene.loads import DeadForces
+from kop_exudyn.structures.base import design_from_dict
+from kop_exudyn.structures.loads import DeflectionLimit, LoadCase
+
+CORNERS = [0, 4, 20, 24]
+MIDDLE = 12
+
+
+@pytest.fixture(scope="module")
+def data(repository):
+    """A dome of five lamellas each way."""
+    path = repository / "models" / "grids" / "01_dome.json"
+    found = json.loads(path.read_text(encoding="utf-8"))
+    for axis in "uv":
+        found["network"][axis] = found["network"][axis][::2]
+    return found
+
+
+@pytest.fixture(scope="module")
+def dome(data):
+    return design_from_dict(data)
+
+
+@pytest.fixture(scope="module")
+def opened(dome):
+    return dome.deploy()["deployed"]
+
+
+def pushed(force: float, **more) -> LoadCase:
+    return LoadCase(joints=[MIDDLE], forces=[[0, 0, -force]], supports=CORNERS, **more)
+
+
+@pytest.fixture(scope="module")
+def first_bifurcation(dome, opened):
+    """The factor of a unit load at which the arc-length path first meets a singular stiffness."""
+    _, held = held_scene(dome, opened, pushed(1.0))
+    path = trace(
+        held,
+        opened.q,
+        DeadForces(dome.joints[[MIDDLE]], [[0, 0, -1.0]]),
+        start=opened,
+        stop=lambda point: point.negative > 0,
+        options=PathOptions(rotation=0.05),
+    )
+    return path.critical[0].point.factor
+
+
+def test_the_critical_factor_is_that_of_the_path(dome, opened, first_bifurcation):
+    """It is a lower bound, a sixty-fourth of the factor asked for below at most."""
+    asked = 10.0
+    case = pushed(1.0, factor=asked)
+    found = critical_factor(dome, opened, case, 4 * asked)
+    assert first_bifurcation - asked / 64 <= found <= first_bifurcation
+    check = check_load(dome, opened, case)
+    assert check.stable and not check.beyond and check.critical == pytest.approx(found)
+
+
+def test_more_than_it_bears(dome, opened, first_bifurcation):
+    check = check_load(dome, opened, pushed(1.0, factor=1.2 * first_bifurcation))
+    assert not check.stable and not check.carried() and check.factored is None
+    assert check.critical == pytest.approx(first_bifurcation, rel=0.03)
+    # the load itself is borne, so its deflection is known
+    assert check.loaded is not None and check.deflection > 0
+    told = check.to_dict()
+    assert told["stable"] is False and told["utilisation"] is None
+
+
+def test_looking_no_further_than_twice_the_factor(dome, opened):
+    check = check_load(dome, opened, pushed(1.0))
+    assert check.carried() and check.beyond and check.critical == 2.0
+
+
+def test_limits_on_the_deflection(dome, opened):
+    check = check_load(dome, opened, pushed(1.0))
+    moved, span = check.deflection, check.span
+    x = opened.state.positions[dome.joints]
+    assert span == pytest.approx(np.linalg.norm(x[0] - x[24]))
+    for limit, kept in (
+        (DeflectionLimit(absolute=1.01 * moved), True),
+        (DeflectionLimit(absolute=0.99 * moved), False),
+        (DeflectionLimit(span_over=0.99 * span / moved), True),
+        (DeflectionLimit(span_over=1.01 * span / moved), False),
+        (DeflectionLimit(absolute=1.01 * moved, span_over=1.01 * span / moved), False),
+    ):
+        assert check_load(dome, opened, pushed(1.0, deflection=limit)).carried() is kept
+
+
+def test_the_thickness_that_carries_a_load_carries_it(data, dome, opened, first_bifurcation):
+    case = pushed(1.0, factor=1.5 * first_bifurcation)
+    found = carrying_thickness(dome, opened, case)
+    assert found is not None
+    share, used = found
+    assert 1 < share < 3 and 0 < used < 1
+    for thickness, carries in ((share, True), (0.8 * share, False)):
+        section = {**data["section"], "width": thickness * data["section"]["width"]}
+        other = design_from_dict({**data, "section": section})
+        check = check_load(other, other.deploy()["deployed"], case)
+        assert check.stable is carries
+
+
+def test_no_thickness_carries_everything(dome, opened):
+    limit = DeflectionLimit(absolute=1e-9)
+    assert carrying_thickness(dome, opened, pushed(1.0, deflection=limit)) is None
+
+
+class TestFiles:
+    def test_cases_with_factors_limits_and_supports(self, data):
+        cases = [
+            {"name": "own weight", "gravity": [0, 0, -9.81], "factor": 1.35},
+            {
+                "points": [{"joint": 3, "force": [0, 0, -2]}],
+                "supports": [1, 2, 20],
+                "deflection": {"span_over": 200},
+            },
+        ]
+        design = design_from_dict({**data, "supports": CORNERS, "load_cases": cases})
+        first, second = design.load_cases
+        assert (first.name, first.factor, first.supports.tolist()) == ("own weight", 1.35, CORNERS)
+        assert second.name == "case 2" and second.supports.tolist() == [1, 2, 20]
+        assert second.deflection.allowed(4.0) == pytest.approx(0.02)
+        assert first.deflection.allowed(4.0) == np.inf
+        assert first.times(2.0).gravity.tolist() == [0, 0, -19.62]
+
+    def test_the_field_loads_is_a_case(self, data):
+        design = design_from_dict({**data, "loads": {"gravity": [0, 0, -9.81], "factor": 2}})
+        assert [(case.name, case.factor) for case in design.load_cases] == [("loads", 2.0)]
+
+    def test_supports_alone_are_no_case(self, data):
+        design = design_from_dict({**data, "supports": CORNERS})
+        assert design.load_cases == () and design.loads.supports.tolist() == CORNERS
+
+    @pytest.mark.parametrize(
+        "cases, field",
+        [
+            ([{"gravity": [0, 0, -1], "name": "a"}] * 2, r"load_cases\[1\].name"),
+            ([{"factor": 2.0}], r"load_cases\[0\]"),
+            ([{"points": [{"joint": 25, "force": [0, 0, 1]}]}], "joint"),
+        ],
+    )
+    def test_unusable_cases(self, data, cases, field):
+        with pytest.raises(InputError, match=field):
+            design_from_dict({**data, "load_cases": cases})
+
+    @pytest.mark.parametrize("factor", [0.0, -1.0, np.nan])
+    def test_factors_are_positive(self, factor):
+        with pytest.raises(InputError, match="factor"):
+            LoadCase(factor=factor)
+        with pytest.raises(InputError, match="absolute"):
+            DeflectionLimit(absolute=factor)
