@@ -101,8 +101,8 @@ class Buildable:
     utilisation : state -> equivalent stress over elastic limit, None where no limit is known
     softest : eigenvalue of the deployed state's softest mode over the input design's
     softest_on_the_way : the smallest eigenvalue of the states that it is opened through, once it
-        has left the assembly's plane, over the input design's in its deployed state; None where
-        these states are not known
+        is off the floor, over the input design's in its deployed state; None where these states
+        are not known
     forgiveness : None where the design was not found
     loads : by load case
     fabrication : what stands in the way of cutting the parts; None where nothing is known of them
@@ -228,7 +228,8 @@ def judge(
     stops += about_loads(design, deployed, checks, settings.safety)
     role = design.fitted_role.name
     as_given = _softness(design.scene(role), inputs[role])
-    on_way = [_softness(*one) for one in on_the_way.values() if not _flat(design, one[1])]
+    risen = _risen(design)
+    on_way = [_softness(*one) for name, one in on_the_way.items() if name in risen]
     return Buildable(
         design.name,
         moved,
@@ -251,10 +252,14 @@ def _way(design: Design, opened: Evaluation) -> dict[str, tuple[Scene, Equilibri
     return {station.name: (design.scene(station.scene), state) for station, state in stations}
 
 
-def _flat(design: Design, state: Equilibrium) -> bool:
-    """Whether a state on the way has not left the assembly's plane yet: there its softest mode is
-    that of a floppy net on the floor."""
-    return design.way is not None and design.way.is_flat(state)
+def _risen(design: Design) -> set[str]:
+    """Names of the stations from where nothing but the opening moves a design: before that, an
+    assembly on the floor is lifted by hand."""
+    if design.way is None:
+        return set()
+    stations = design.way.stations
+    first = next((n for n, station in enumerate(stations) if station.lifted is not None), 0)
+    return {station.name for station in stations[first:]}
 
 
 def _softness(scene: Scene, state: Equilibrium) -> float:
