@@ -149,7 +149,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         type=not_negative,
         metavar="N",
         help="how often the second stage goes on from where the designs open into, while that is "
-        "another state (default: 2)",
+        "another state (default: 4)",
     )
     parser.add_argument(
         "--safety",

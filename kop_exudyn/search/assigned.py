@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import SimulationFailure
 from .objective import DesignDerivatives, Evaluation
 from .reassign import LocalModel, MoveParts, Reassignment, best_parts, keep_parts, reassign
+from .settings import StageSettings
 from .stage_results import SAME_STATE, StageResult, combined, distance
 from .stages import Stages
 
@@ -43,6 +44,7 @@ def assigned_stage(
     stages: Stages,
     start: StageResult,
     numbers: Iterator[int] | None = None,
+    leaps: int | None = None,
 ) -> StageResult:
     """Reassign and optimise in turns until neither gains, from a state in which every element is
     its part; then leap.
@@ -52,6 +54,7 @@ def assigned_stage(
     from there the better one is kept (iterated local search: Lourenço, Martin, Stützle 2003).
 
     numbers : of the rounds, where this isn't the first call: every SQP has a name of its own
+    leaps : default: the settings'
     """
     settings = stages.settings
     if settings.reassignments == 0:
@@ -59,7 +62,7 @@ def assigned_stage(
         return stages.assigned(start, name) if stages.rule.parts_move else start
     rounds = _Rounds(stages, numbers or count(1), start.steps)
     best = rounds.alternated(start, settings.reassignments)
-    leaps = settings.leaps
+    leaps = settings.leaps if leaps is None else leaps
     while leaps > 0 and best.value is not None:
         for trial in _bold_trials(stages, best)[:leaps]:
             leaps -= 1
@@ -80,36 +83,48 @@ def opened_stage(stages: Stages, start: StageResult) -> StageResult:
 
     The states of the assigned stage are led to from the relaxed ones, by ways that no builder goes:
     the search is freer so. Opened from its assembly, a design may end in another stable state; with
-    rounds from there, the optimisation works on the states that a builder will find. Where they
-    still aren't the same in the end, the best of these states are kept, and the parts optimised
-    once more in steps that each keep every design on the branch that it opens along.
+    rounds from there (but no leaps, which end in other states more often), the optimisation works
+    on the states that a builder will find. Where they still aren't the same in the end, the best of
+    these states are kept, and the parts optimised once more in secured steps.
 
     The result's states are those that the designs open into, unless one doesn't open at all.
     """
     settings = stages.settings
     if not stages.required.opening:
         return start
-    best, led, result = None, start, start
-    numbers = count(2 + settings.reassignments + settings.leaps * (1 + _AFTER_LEAP))
+    best: StageResult | None = None
+    result, numbers = start, count(_rounds_at_most(settings))
     for number in range(settings.redeployments + 1):
         opened = stages.judged(replace(result, designs=stages.redeployed(result)))
+        log.info("opened from the assembly: J = %.5g, from %.5g", _value(opened), _value(result))
+        same = opened.value is not None and _all_same(stages, result, opened)
         if opened.value is not None and (best is None or _value(opened) < _value(best)):
-            best, led = opened, result
-        same = _all_same(stages, result, opened)
+            best = result if same else opened
         if number == settings.redeployments or opened.value is None or same:
             break
-        opened = stages.confirmed(opened)
-        if opened.value is None:
-            break
-        result = assigned_stage(stages, opened, numbers)
-    if best is None or _all_same(stages, led, best):
-        return replace(led, jumps=start.jumps)
-    best = stages.kept(best)
-    if stages.rule.parts_move and best.value is not None:
-        secured = stages.assigned(best, f"assigned-{next(numbers)}", secured=True)
-        secured = replace(secured, steps=led.steps + secured.steps)
-        best = min((best, secured), key=_value)
+        result = assigned_stage(stages, stages.confirmed(opened), numbers, leaps=0)
+    if best is None:
+        return start
+    if best is not result:
+        best = _secured(stages.secured(), best, numbers)
     return replace(best, jumps=start.jumps)
+
+
+def _secured(stages: Stages, best: StageResult, numbers: Iterator[int]) -> StageResult:
+    """Designs in the states that they open into, with the parts optimised once more in steps that
+    keep every design on the branch along which it opens; as they were where that gains nothing."""
+    best = stages.kept(best)
+    if not stages.rule.parts_move or best.value is None:
+        return best
+    found = stages.assigned(best, f"assigned-{next(numbers)}")
+    opened = replace(found, designs=stages.redeployed(found))
+    same = found.value is not None and _all_same(stages, found, opened)
+    return replace(found, steps=best.steps + found.steps) if same else best
+
+
+def _rounds_at_most(settings: StageSettings) -> int:
+    """How many rounds the assigned stage may have had before its designs are opened."""
+    return 2 + settings.reassignments + settings.leaps * (1 + _AFTER_LEAP)
 
 
 @dataclass
@@ -200,7 +215,7 @@ def _best_trial(stages: Stages, best: StageResult) -> StageResult | None:
     found = [trial for trial in trials if trial is not None]
     if not found or _value(trial := min(found, key=_value)) >= _PATIENCE * _value(best):
         return None
-    trial = stages.confirmed(trial)
+    trial = stages.kept(trial)
     return trial if trial.value is not None else None
 
 
@@ -267,7 +282,7 @@ def _bold_trials(stages: Stages, best: StageResult) -> list[StageResult]:
             found.append(trial[0])
         if len(found) == _TRIALS:
             break
-    confirmed = [stages.confirmed(trial) for trial in sorted(found, key=_value)]
+    confirmed = [stages.kept(trial) for trial in sorted(found, key=_value)]
     return [trial for trial in confirmed if trial.value is not None]
 
 

@@ -80,7 +80,7 @@ class StageSettings:
     reassignments: int = 4
     reassigned_tolerance: float = 2e-2
     leaps: int = 3
-    redeployments: int = 2
+    redeployments: int = 4
     path_steps: int = 10
     rescues: int = 2
     growth: int = 0

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from typing import Any, Protocol
 
@@ -136,19 +137,16 @@ class Stages:
         name: str = "assigned",
         max_steps: int | None = None,
         tolerance: float | None = None,
-        secured: bool = False,
     ) -> StageResult:
         """Minimise over the parts from a state in which every element is its part; designs that
         failed stay out.
 
         max_steps, tolerance : default: the settings' `assigned_steps` and `assigned_tolerance`
-        secured : from states that `kept` gave, in steps that keep every design on the branch along
-            which it opens
         """
         members = [n for n, e in enumerate(start.designs) if isinstance(e, Evaluation)]
         if not members:
             return replace(start, status="no design could be built from the kit", jumps=[])
-        problem = self.assigned_problem(start, members, secured)
+        problem = self.assigned_problem(start, members)
         try:
             check_feasible(problem.lower, problem.upper, problem.constraints)
         except InputError as error:
@@ -176,11 +174,8 @@ class Stages:
         )
         return self.confirmed(replace(found, pressure=_pressure(result)))
 
-    def assigned_problem(
-        self, start: StageResult, members: Sequence[int], secured: bool = False
-    ) -> AssignedProblem:
-        """The problem over the parts, for some of the designs, perhaps with their openings."""
-        dataset = self.dataset.requiring(self.required) if secured else self.dataset
+    def assigned_problem(self, start: StageResult, members: Sequence[int]) -> AssignedProblem:
+        """The problem over the parts, for some of the designs."""
         constraints = self.settings.constraints
         if constraints is not None and len(members) < len(self.dataset.designs):
             offsets = self.dataset.offsets
@@ -188,7 +183,7 @@ class Stages:
                 np.concatenate([np.arange(offsets[n], offsets[n + 1]) for n in members])
             )
         return AssignedProblem(
-            dataset.subset(members),
+            self.dataset.subset(members),
             start.kit,
             restrict(start.assignment, self.dataset, members),
             self.settings.bounds,
@@ -219,8 +214,8 @@ class Stages:
         return replace(result, value=value, penalty=penalty)
 
     def opened(self, result: StageResult) -> StageResult:
-        """The same result with every design in the state that it opens into by itself, where
-        designs have to; not confirmed yet.
+        """The same result with every design in the state that it opens into by itself; not
+        confirmed yet.
 
         A design for which no such state is found keeps the one it is in.
         """
@@ -228,7 +223,7 @@ class Stages:
             n: d for n, d in enumerate(result.designs) if isinstance(d, Evaluation) and not d.way
         }
         designs = list(result.designs)
-        for n, evaluation in self.dataset.requiring(self.required).open(found).items():
+        for n, evaluation in self.dataset.open(found).items():
             if isinstance(evaluation, SimulationFailure):
                 log.info("%s", evaluation)
             else:
@@ -245,8 +240,16 @@ class Stages:
         return self.judged(replace(result, designs=designs))
 
     def kept(self, result: StageResult) -> StageResult:
-        """A result that the search goes on from: opened, and confirmed."""
-        return self.confirmed(self.opened(result))
+        """A result that the search goes on from: confirmed, and opened where the stages are
+        secured."""
+        return self.confirmed(self.opened(result) if self.dataset.requirements.opening else result)
+
+    def secured(self) -> Stages:
+        """The same stages with designs kept on the branch along which they open: reassigned ones
+        are judged where they open into, and steps that leave the branch are refused."""
+        other = copy(self)
+        other.dataset = self.dataset.requiring(self.required)
+        return other
 
     def redeployed(self, result: StageResult) -> list[Evaluation | SimulationFailure]:
         """Every design built of the result's parts and deployed from its own starting geometry,
@@ -256,7 +259,7 @@ class Stages:
             for d, design in zip(result.designs, self.dataset.designs)
         ]
         q = self._realised(result.kit, result.assignment, np.concatenate(places)[self.dataset.free])
-        secured = self.dataset.requiring(self.required)
+        secured = self.secured().dataset
         found = secured.redeploy(q, range(len(result.designs)))
         opened = {n: at for n, at in found.items() if isinstance(at, Evaluation)}
         found = {**found, **secured.confirm(opened)}
