@@ -47,13 +47,13 @@ def run(shell):
         pool.prepare()
         dataset = Dataset.of_pool(pool, weights)
         plain = Stages(dataset, PARTS, StageSettings(requirements=Requirements()))
-        start = plain.kept(plain.direct())
+        start = plain.secured().kept(plain.direct())
         stressed = max(start.evaluations[0].utilisation.values())
         required = Requirements(safety=1.15 / stressed)
         store = Steps()
         stages = Stages(dataset, PARTS, StageSettings(requirements=required), store)
-        start = stages.kept(stages.direct())
-        result = stages.assigned(start, secured=True)
+        start = stages.secured().kept(stages.direct())
+        result = stages.secured().assigned(start)
         led = Stages(dataset, PARTS, StageSettings(requirements=required)).assigned(start)
         places = [
             evaluations_from_arrays(
