@@ -17,17 +17,20 @@ import numpy as np
 
 from ..errors import InputError
 from ..kit.kinds import part_kind
+from ..search.requirements import Requirements
 from ..search.result import KitResult
 from ..search.run import optimize_kit
 from ..search.settings import JobSettings
 from ..search.stage_results import StageResult
 from ..search.stages import NoStore, PrefixedStore, Store
 from ..structures.base import Design
+from ..structures.strength import strength_summary
 from .reuse import counts_of, fabricated, kit_size_percent
 
 log = logging.getLogger(__name__)
 
 _SHARE = 0.25  # of a kind's parts, by which kits grow, and shrink at first
+_EXCESS = 1e-3  # of the elastic limit: what the search's tolerances leave
 _MOST = 60  # parts of a kind; designs that need more share nothing worth the name
 
 
@@ -114,6 +117,32 @@ def deviation(result: KitResult) -> float:
     return max(one["fit"]["max_percent"] for one in found)
 
 
+def unmet(result: KitResult, required: Requirements) -> list[str]:
+    """In words, by which designs a kit misses what is required of it: that they open by themselves
+    into the states found, and that these keep below the elastic limit.
+
+    A design that is stressed beyond it as given can't be helped by a kit, and is left out.
+    """
+    found = []
+    for n, design in enumerate(result.designs):
+        opened = result.redeployment(n) if result.redeployed else {"same_state": True}
+        if required.opening and not opened.get("same_state", False):
+            found.append(f"{design.name} opens into another state")
+        if not required.stress:
+            continue
+        given = _utilisation(strength_summary(design, result.references[n].equilibria))
+        used = _utilisation(result.summary("assigned", n).get("strength", {}))
+        if required.safety * given <= 1 < required.safety * used - _EXCESS:
+            found.append(f"{design.name} is stressed to {used:.2f} of its limit")
+    return found
+
+
+def _utilisation(strength: Mapping[str, Mapping[str, Any]]) -> float:
+    """The largest of all states; 0 where none is known."""
+    known = [state["utilisation"] for state in strength.values()]
+    return max((value for value in known if value is not None), default=0.0)
+
+
 def smallest_kit(
     designs: Sequence[Design],
     limit: float,
@@ -128,7 +157,8 @@ def smallest_kit(
 ) -> tuple[SizedKit | None, list[SizedKit]]:
     """The cheapest kit found from which all designs can be built within a deviation.
 
-    limit : largest deviation, % of each design's box
+    limit : largest deviation, % of each design's box; the requirements of the settings have to be
+        met as well, see `unmet`
     first : kind -> number of parts of the kit that the search begins with
     cost : what is to be small
     accepts : further conditions on a kit
@@ -146,8 +176,10 @@ def smallest_kit(
         raise InputError("expected a positive deviation in %", field="max_deviation", value=limit)
     chain = _Chain(designs, settings, store, observer, announce)
 
+    required = settings.stages.requirements
+
     def good(kit: SizedKit) -> bool:
-        return kit.max_percent <= limit and accepts(kit.result)
+        return kit.max_percent <= limit and not unmet(kit.result, required) and accepts(kit.result)
 
     now = chain.kit(dict(first))
     most = {kind: min(_MOST, count) for kind, count in _elements(designs).items()}

@@ -47,7 +47,7 @@ def resized(stages: Stages, result: StageResult, sizes: Mapping[str, int]) -> St
             )
             built = stages.built_from(kit, assignment, result.evaluations, free)
             larger = len(kit[kind]) > len(result.kit[kind])
-            if larger and found is not None and _value(built) > _value(result):
+            if larger and found is not None and built.merit > result.merit:
                 built = stages.built_from(*_with_copy(result, kind), result.evaluations)
             if built.value is None:
                 return built
@@ -135,10 +135,6 @@ def _judged(
 def _best(found: list[Reassignment | None]) -> Reassignment | None:
     there = [one for one in found if one is not None]
     return min(there, key=lambda one: float(one.predicted.sum())) if there else None
-
-
-def _value(result: StageResult) -> float:
-    return np.inf if result.value is None else result.value
 
 
 def _with_copy(result: StageResult, kind: str) -> tuple[Kit, Assignment]:

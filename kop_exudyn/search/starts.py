@@ -71,9 +71,9 @@ def assigned_from_starts(
         found = model_starts(stages, bases, effort)
     starts = [("relaxed", built), *(("model", start) for start in found)]
     tried = [TriedStart(origin, start.value) for origin, start in starts]
-    limit = _PROMISING * min(_value(start) for _, start in starts)
-    promising = [n for n in range(len(starts)) if n == 0 or _value(starts[n][1]) <= limit]
-    order = sorted(promising, key=lambda n: _value(starts[n][1]))[: effort.optimised]
+    limit = _PROMISING * min(start.merit for _, start in starts)
+    promising = [n for n in range(len(starts)) if n == 0 or starts[n][1].merit <= limit]
+    order = sorted(promising, key=lambda n: starts[n][1].merit)[: effort.optimised]
     best, which = built, 0
     for k, n in enumerate(order):
         start = starts[n][1] if starts[n][0] == "relaxed" else stages.confirmed(starts[n][1])
@@ -83,7 +83,7 @@ def assigned_from_starts(
         log.info(
             "start %d (%s) ends at J = %s, from %s", k + 1, starts[n][0], end.value, start.value
         )
-        if k == 0 or _value(end) < _value(best):
+        if k == 0 or end.merit < best.merit:
             best, which = end, n
     tried[which] = replace(tried[which], kept=True)
     return replace(best, jumps=built.jumps), tried
@@ -121,7 +121,7 @@ def model_starts(
                 )
                 found.append(built)
     whole = [built for built in found if built.value is not None]
-    return sorted(whole, key=lambda built: built.value or 0.0)
+    return sorted(whole, key=lambda built: built.merit)
 
 
 def _best_under(stages: Stages, model: LocalModel, options: Effort) -> list[Reassignment]:
@@ -164,10 +164,6 @@ def _improved(
         stages.dataset, kit, assignment, stages.settings.bounds, stages.settings.constraints
     )
     return improved(problem, model)
-
-
-def _value(result: StageResult) -> float:
-    return np.inf if result.value is None else result.value
 
 
 def _shaken(assignment: Assignment, kit: Kit, rng: np.random.Generator) -> Assignment:

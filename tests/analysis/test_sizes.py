@@ -1,15 +1,18 @@
 """Kits of neighbouring sizes: larger ones are never worse, and the smallest that will do."""
 
+import copy
+
 import numpy as np
 import pytest
 from support.zigzags import zigzags
 
-from kop_exudyn.analysis.sizes import KitCost, deviation, smallest_kit, trade_off
+from kop_exudyn.analysis.sizes import KitCost, deviation, smallest_kit, trade_off, unmet
 from kop_exudyn.errors import InputError
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.neighbours import resized
 from kop_exudyn.search.objective import Weights
 from kop_exudyn.search.pool import DesignPool
+from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.search.stages import Stages
@@ -72,6 +75,19 @@ def test_the_smallest_kit_that_will_do(designs, middle):
             assert any(kit.sizes == fewer and kit.max_percent > limit for kit in tried)
     wide, _ = smallest_kit(designs, 50.0, {"linear": 2, "angular": 2}, settings=SETTINGS)
     assert wide.sizes == {"linear": 1, "angular": 1}
+
+
+def test_requirements_that_are_missed_are_told(middle):
+    none = Requirements.none()
+    assert unmet(middle, none) == []
+    opened = middle.redeployment(0)
+    expected = [] if opened["same_state"] else ["zigzag 0 opens into another state"]
+    assert unmet(middle, Requirements(stress=False))[: len(expected)] == expected
+    # the second design's states in place of the first one's: then it opens into another state
+    swapped = copy.copy(middle)
+    swapped.redeployed = list(middle.redeployed)[::-1]
+    swapped.stages = {**middle.stages}
+    assert any("opens into another" in text for text in unmet(swapped, Requirements(stress=False)))
 
 
 def test_a_kit_grows_until_it_is_good_enough_or_is_not(designs, middle):
