@@ -87,3 +87,12 @@ def test_quick_failure_and_rescue(run):
 def test_pavilion(run):
     data = run("pavilion")
     assert len(data["pavilions"]) == 1 and data["pavilions"][0]["elements"] > 0
+
+
+def test_buildable(run):
+    data = run("buildable")
+    rows = data["designs"]
+    assert {row["required"] for row in rows} == {"nothing", "opening", "opening, stress"}
+    assert all(row["opened max %"] > 0 for row in rows if row["class"] == "C-shells")
+    opened = [row for row in rows if row["required"] != "nothing" and row["class"] == "C-shells"]
+    assert opened and all(row["opens"] and row["utilisation"] > 0 for row in opened)
