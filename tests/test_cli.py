@@ -21,6 +21,7 @@ from kop_exudyn.structures import base
 
 ANSWER = {
     "design": "arch",
+    "engine": "newton",
     "unknowns": 120,
     "elements": 20,
     "engine": "fast",
@@ -69,7 +70,9 @@ def design_file(monkeypatch, write_json_file):
     monkeypatch.setitem(
         base.CLASSES.items,
         "named",
-        lambda data, source: SimpleNamespace(name=data["name"], fit_weight=1e5, units=None),
+        lambda data, source: SimpleNamespace(
+            name=data["name"], fit_weight=1e5, stress_weight=0.0, units=None
+        ),
     )
     return write_json_file(
         "set/arch.json",
