@@ -97,7 +97,7 @@ def _thumbnail(content: bytes) -> str:
 
 
 def _html(entries: list[Entry], title: str, lead: str) -> str:
-    css = (files(__package__) / "page.css").read_text(encoding="utf-8")
+    css = (files("kop_exudyn.report") / "page.css").read_text(encoding="utf-8")
     policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
     return "\n".join(
         [

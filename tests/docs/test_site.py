@@ -44,7 +44,9 @@ def test_every_page_is_built_without_warnings(site):
 def test_class_pages_show_the_schemas_fields(site, name):
     html = (site / "classes" / f"{name}.html").read_text(encoding="utf-8")
     schema = json.loads(
-        (ROOT / "kop_exudyn" / "structures" / f"{name}.schema.json").read_text(encoding="utf-8")
+        (ROOT / "kop_exudyn" / "structures" / name / f"{name}.schema.json").read_text(
+            encoding="utf-8"
+        )
     )
     for field in schema["properties"]:
         assert f">{field}<" in html
