@@ -21,7 +21,6 @@ from kop_exudyn.structures import base
 
 ANSWER = {
     "design": "arch",
-    "engine": "newton",
     "unknowns": 120,
     "elements": 20,
     "engine": "fast",
