@@ -111,6 +111,7 @@ def _kit(args: argparse.Namespace) -> list[Path]:
     from ..exchange.export import export_desk
     from ..fabrication.blanks import Blanks
     from ..fabrication.folder import export_workshop
+    from ..fabrication.limits import usual_options
     from ..fabrication.options import Tolerances
     from ..fabrication.pieces import parts_list_of
     from ..fabrication.readiness import obstacles, refuse
@@ -123,10 +124,10 @@ def _kit(args: argparse.Namespace) -> list[Path]:
             source=args.what,
             field="FOLDER",
         )
-    options = _options(args)
     tolerances = Tolerances(*args.tolerance) if args.tolerance else Tolerances()
     result = load_run(args.what, load_designs(args.folder))
     unit, parts = _unit(args, result.units), parts_list_of(result)
+    options = _options(args, usual_options(result.designs))
     found = obstacles(result, Blanks(parts, unit, options) if args.only != "desk" else None)
     if not args.force:
         refuse(found)
@@ -165,12 +166,13 @@ def _design(args: argparse.Namespace) -> list[Path]:
     return export_simulation(simulate(load_design(args.what)), args.out, overwrite=args.overwrite)
 
 
-def _options(args: argparse.Namespace) -> CutOptions:
-    from ..fabrication.options import CutOptions
+def _options(args: argparse.Namespace, usual: CutOptions) -> CutOptions:
+    """The usual sizes, and what is given instead."""
+    from dataclasses import replace
 
     names = ("sheet", "stock", "kerf", "gap", "clearance", "joint_hole", "bolt_hole")
     given = {name: value for name in names if (value := getattr(args, name)) is not None}
-    return CutOptions(**given, corners=not args.no_corners)
+    return replace(usual, **given, corners=not args.no_corners)
 
 
 def _unit(args: argparse.Namespace, units: Units | None) -> str:

@@ -14,8 +14,9 @@ def obstacles(result: KitResult, blanks: Blanks | None = None) -> list[str]:
     """What is wrong with building a result's designs, one sentence each, naming the design or part.
 
     blanks : what is cut; None for a result that is only looked at
-    A design is in the way when it was not found, when it is stressed beyond its limit in a state
-    that is built, or when its parts open into another state than the one shown; a part, when it has
+    Of designs, what their verdicts say that came with the result. Of results without verdicts: a
+    design is in the way when it was not found, when it is stressed beyond its limit in a state that
+    is built, or when its parts open into another state than the one shown. A part is, when it has
     no room for its holes or does not fit a sheet or bar.
     """
     found = [*_of_designs(result)]
@@ -34,6 +35,13 @@ def refuse(found: list[str]) -> None:
 
 
 def _of_designs(result: KitResult) -> Iterator[str]:
+    for design, verdict in zip(result.designs, result.buildable):
+        for stop in verdict["stops"]:
+            if stop["cause"] != "fabrication":  # asked of what is cut, with the options at hand
+                helps = f" ({stop['helps']})" if stop["helps"] else ""
+                yield f"{design.name}: {stop['why']}{helps}"
+    if result.buildable:
+        return
     for number, design in enumerate(result.designs):
         summary = result.summary("assigned", number)
         if "failed" in summary:

@@ -74,6 +74,9 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
             k: ClusteringGap.from_dict(gap) for k, gap in data.get("clustering", {}).items()
         },
     )
+    verdicts = [entry["buildable"] for entry in data["designs"] if "buildable" in entry]
+    if len(verdicts) == len(designs):
+        result.buildable, result.verdict = verdicts, data.get("verdict", ())
     for stage in STAGES:
         outcomes = [
             _outcome(objective, stage, states, entry, q if stage == _LAST else None)
