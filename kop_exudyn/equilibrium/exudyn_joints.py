@@ -58,7 +58,8 @@ class _Joint:
     """One joint: Exudyn's number, its sides, which axes it holds, and what it stands for.
 
     marker : of its first side; hinge : whose prescribed angle turns that side, or -1; body : whose
-    axes in the scene are that side's, or -1; rows : its rotational equations among `_Equations`
+    axes in the scene are that side's, or -1; rows : its rotational equations among `_Equations`;
+    set : the frame that its first side has been given last
     """
 
     number: Any
@@ -70,6 +71,7 @@ class _Joint:
     hinge: int = -1
     body: int = -1
     rows: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    set: np.ndarray | None = None
 
 
 @dataclass
@@ -113,6 +115,7 @@ class Joints:
         }
         self._joints: list[_Joint] = []
         self._held: list[tuple[Any, int, int]] = []  # connector, body and axis of a place
+        self._offsets: dict[Any, float] = {}
         self._add_ties()
         self._add_hinges(scene)
         self._add_pins(scene)
@@ -242,13 +245,18 @@ class Joints:
                 frame = state.rotations[joint.body]
             else:
                 continue
+            if np.array_equal(frame, joint.set):
+                continue
+            joint.set = frame
             end = _End(joint.first.node, frame, joint.first.place)
             self._mbs.SetMarkerParameter(joint.marker, "localHT", end.pose)
             equations.a[joint.rows] = frame.T[equations.a_axis[joint.rows].astype(int)]
         for connector, body, axis in self._held:
             node = self._layout.carriers[body, -1].node
-            offset = state.positions[body, axis] / self._unit - reference[node, axis]
-            self._mbs.SetObjectParameter(connector, "offset", float(offset))
+            offset = float(state.positions[body, axis] / self._unit - reference[node, axis])
+            if offset != self._offsets.get(connector):
+                self._offsets[connector] = offset
+                self._mbs.SetObjectParameter(connector, "offset", offset)
 
     def geometric_stiffness(
         self, rotations: np.ndarray, reactions: np.ndarray
