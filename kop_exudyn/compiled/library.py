@@ -37,9 +37,13 @@ def library() -> ctypes.CDLL | None:
     return None
 
 
-def address(array: np.ndarray, kind: type = np.float64) -> int:
-    """Where a contiguous array's numbers begin. Raises TypeError for other arrays: the kernels
-    would read what isn't there."""
+def address(
+    array: np.ndarray, kind: type = np.float64, shape: tuple[int, ...] | None = None
+) -> int:
+    """Where a contiguous array's numbers begin. Raises TypeError for other arrays and ValueError
+    for another shape than the one given: the kernels would read or write what isn't there."""
+    if shape is not None and array.shape != shape:
+        raise ValueError(f"expected an array of shape {shape}, got {array.shape}")
     if array.dtype != kind or not array.flags.c_contiguous:
         raise TypeError(f"expected a contiguous array of {np.dtype(kind)}, got {array.dtype}")
     return array.ctypes.data

@@ -50,6 +50,8 @@ class Solutions:
         kernels = library()
         if kernels is None:
             return matrix @ self.rows(np.arange(len(self.place)))
+        if matrix.shape[1] != len(self.place):
+            raise ValueError(f"a matrix of {matrix.shape[1]} columns, expected {len(self.place)}")
         out = np.zeros((matrix.shape[0], self.count))
         indptr, data = matrix.indptr.astype(np.int32), matrix.data.astype(float)
         places = self.place[matrix.indices]

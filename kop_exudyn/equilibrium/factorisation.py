@@ -134,6 +134,8 @@ class SupernodalFactorisation(Factorisation):
         self._check()
         if rhs.ndim == 2:
             return np.stack([self.solve(column) for column in rhs.T], axis=1)
+        if rhs.shape != (self._n,):
+            raise ValueError(f"a right-hand side of shape {rhs.shape}, expected ({self._n},)")
         x = np.asarray(rhs, float)[self._order]
         self._kernels.solve(
             self._at,
@@ -154,6 +156,8 @@ class SupernodalFactorisation(Factorisation):
     ) -> Solutions:
         self._check()
         count = rhs.shape[1]
+        if rhs.shape[0] != self._n:
+            raise ValueError(f"right-hand sides of {rhs.shape[0]} rows, expected {self._n}")
         constrained, shares, own = np.empty(0, np.int64), np.empty(0), np.empty(0)
         if constraint is not None and column is not None:
             rows = np.flatnonzero(constraint)

@@ -109,10 +109,11 @@ def evaluate_compiled(
         np.empty((n, 6, 12)),
     )
     stress = None if stress is None else np.ascontiguousarray(stress, float)
+    shapes = ((n, 3), (n, 3, 3), (n, 3), (n, 3, 3), (n,), (n, 6), (n, 6))
     kernels.evaluate_elements(
         n,
-        *map(address, given),
-        None if stress is None else address(stress),
+        *[address(array, np.float64, shape) for array, shape in zip(given, shapes)],
+        None if stress is None else address(stress, np.float64, (n, 6)),
         *map(address, out),
     )
     return out

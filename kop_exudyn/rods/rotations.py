@@ -57,8 +57,11 @@ def bend_coefficients(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 def exp_so3(w: np.ndarray) -> np.ndarray:
-    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), radians."""
+    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), radians. ValueError for arrays of
+    another shape."""
     w = np.asarray(w, float)
+    if w.shape[-1:] != (3,):
+        raise ValueError(f"expected rotation vectors of shape (..., 3), got {w.shape}")
     flat = np.ascontiguousarray(w).reshape(-1, 3)
     kernels = library()
     if kernels is None:
@@ -69,8 +72,11 @@ def exp_so3(w: np.ndarray) -> np.ndarray:
 
 
 def log_so3(R: np.ndarray) -> np.ndarray:
-    """Rotation vectors (..., 3), of length at most pi, of rotation matrices (..., 3, 3)."""
+    """Rotation vectors (..., 3), of length at most pi, of rotation matrices (..., 3, 3). ValueError
+    for arrays of another shape."""
     R = np.asarray(R, float)
+    if R.shape[-2:] != (3, 3):
+        raise ValueError(f"expected rotations of shape (..., 3, 3), got {R.shape}")
     flat = np.ascontiguousarray(R).reshape(-1, 3, 3)
     kernels = library()
     if kernels is None:
@@ -85,7 +91,13 @@ def compose_increments(R: np.ndarray, w: np.ndarray) -> np.ndarray:
     orthonormal: thousands of products would otherwise drift off SO(3) by round-off.
 
     R : (n, 3, 3) rotations;  w : (n, 3) rotation vectors, radians
+
+    Raises ValueError for arrays of another shape.
     """
+    if R.ndim != 3 or R.shape[1:] != (3, 3) or w.shape != (len(R), 3):
+        raise ValueError(
+            f"expected rotations (n, 3, 3) and vectors (n, 3), got {R.shape}, {w.shape}"
+        )
     kernels = library()
     if kernels is None:
         P = R @ _exponentials(w)

@@ -58,6 +58,9 @@ class LinearActuators(SceneTerm):
                 "weights of actuators must be finite and not negative", field="actuators.weight"
             )
         self.alignment, self.extension, self.shear = alignment, extension, shear
+        if min(self.top.min(initial=0), self.bottom.min(initial=0)) < 0:
+            raise InputError("bodies are numbered from 0", field="actuators")
+        self._highest = int(max(self.top.max(initial=-1), self.bottom.max(initial=-1)))
         six = np.arange(6)
         self.dofs = np.concatenate(
             [6 * self.top[:, None] + six, 6 * self.bottom[:, None] + six], axis=1
@@ -109,11 +112,15 @@ class LinearActuators(SceneTerm):
             np.ascontiguousarray(a, float)
             for a in (self.spacing, self.weight, factors, state.positions, state.rotations)
         ]
+        n = len(state.positions)
+        if self._highest >= n:
+            raise ValueError(f"an actuator names body {self._highest} (there are {n})")
+        shapes = ((m,), (m,), (3,), (n, 3), (n, 3, 3))
         energy = kernels.actuate(
             m,
             address(self.top, np.int64),
             address(self.bottom, np.int64),
-            *[address(a) for a in numbers],
+            *[address(a, np.float64, shape) for a, shape in zip(numbers, shapes)],
             address(g),
             address(H),
         )

@@ -217,16 +217,20 @@ def _descend(
         return _descend_numpy(q, slope, hessian, indices, candidates, choice, least, n_ways, left)
     hessian, indices = np.ascontiguousarray(hessian), np.ascontiguousarray(indices, np.int64)
     candidates = np.ascontiguousarray(candidates, float)
+    elements, k, n = *indices.shape, len(q)
+    if indices.size and not (indices.min() >= 0 and indices.max() < n):
+        raise ValueError(f"elements name parameters that don't exist (there are {n})")
     return kernels.descend(
-        *indices.shape,
+        elements,
+        k,
         len(candidates),
-        len(q),
+        n,
         address(q),
-        address(slope),
-        address(hessian),
+        address(slope, np.float64, (n,)),
+        address(hessian, np.float64, (n, n)),
         address(indices, np.int64),
-        address(candidates),
-        address(choice, np.int64),
+        address(candidates, np.float64, (len(candidates), k)),
+        address(choice, np.int64, (elements,)),
         least,
         n_ways,
         address(left, np.int64),
