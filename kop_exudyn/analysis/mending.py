@@ -41,7 +41,7 @@ class Stop:
         return {"cause": self.cause, "why": self.why, "helps": self.helps}
 
     def __str__(self) -> str:
-        return self.why if self.helps is None else f"{self.why} ({self.helps})"
+        return self.why if self.helps is None else f"{self.why}; {self.helps}"
 
 
 def about_opening(
@@ -134,9 +134,9 @@ def about_loads(
     for check in checks:
         if check.carried(safety):
             continue
-        why = "; ".join(_failing(design, check, safety))
+        why = " and ".join(_failing(design, check, safety))
         helps = _carrying(design, deployed, check, safety)
-        found.append(Stop("load", f"{check.case.name}: {why}", helps))
+        found.append(Stop("load", f"under {check.case.name} it {why}", helps))
     return found
 
 
@@ -144,18 +144,18 @@ def _failing(design: Design, check: LoadCheck, safety: float) -> list[str]:
     found = []
     if not check.stable:
         found.append(
-            f"gives way at {check.critical:.2g} times the load, {check.case.factor:g} is asked for"
+            f"gives way at {check.critical:.2g} times the load ({check.case.factor:g} is asked for)"
         )
     elif check.failed is not None:
-        found.append(check.failed)
+        found.append(f"was not found: {check.failed}")
     if check.loaded is not None and not check.stiff:
         moved, allowed = (
             in_millimetres(value, design.units) for value in (check.deflection, check.allowed)
         )
-        found.append(f"deflects by {moved}, {allowed} is allowed")
+        found.append(f"deflects by {moved} ({allowed} is allowed)")
     used = check.utilisation
     if used is not None and safety * used > 1:
-        found.append(f"stressed to {100 * safety * used:.0f} % of its elastic limit")
+        found.append(f"is stressed to {100 * safety * used:.0f} % of its elastic limit")
     return found
 
 

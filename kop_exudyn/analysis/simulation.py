@@ -23,6 +23,7 @@ from ..structures.fitting import FitResult, TargetFitting
 from ..structures.loads import LoadCase
 from ..structures.plausibility import design_doubts
 from ..structures.strength import strength_summary
+from .load_check import LoadCheck, check_load
 from .loading import LoadedState, loaded_state
 
 log = logging.getLogger(__name__)
@@ -42,6 +43,7 @@ class SimulationResult:
     fit : of the deployed joints to the target
     joints : (n, 3) positions
     loaded : the deployed state under the design's loads, where it has any
+    checks : whether each of the design's own load cases is carried
     engine : what solved for the states
     """
 
@@ -56,6 +58,7 @@ class SimulationResult:
     joints: np.ndarray
     loaded: LoadedState | None = None
     engine: str = FAST
+    checks: tuple[LoadCheck, ...] = ()
 
     @property
     def deployed(self) -> Equilibrium:
@@ -104,6 +107,11 @@ class SimulationResult:
             **self._limits(),
             "strength": strength_summary(self.design, self.equilibria),
             **({"loaded": self.loaded.to_dict()} if self.loaded is not None else {}),
+            **(
+                {"load_cases": {check.case.name: check.to_dict() for check in self.checks}}
+                if self.checks
+                else {}
+            ),
             "joints": (self.joints + self.design.origin).tolist(),
         }
 
@@ -168,6 +176,8 @@ def simulate(design: Design, loads: LoadCase | None = None, engine: str = FAST) 
     fit = TargetFitting(target)(confirmations[fitted].state.positions[design.joints])
     system = design.systems[fitted]
     loaded = None if loads.empty else loaded_state(design, equilibria[fitted], loads, engine=engine)
+    cases = design.load_cases if loads is design.loads else ()
+    checks = tuple(check_load(design, equilibria[fitted], case) for case in cases)
     result = SimulationResult(
         design,
         system.n_unknowns,
@@ -180,6 +190,7 @@ def simulate(design: Design, loads: LoadCase | None = None, engine: str = FAST) 
         joints,
         loaded,
         engine,
+        checks,
     )
     if result.displaced_percent > max(_FAR_AWAY, _SLID * fit.max_percent):
         log.warning(

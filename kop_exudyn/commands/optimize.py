@@ -269,7 +269,7 @@ def run(args: argparse.Namespace) -> int:
                 {
                     "name": design.name,
                     **result.summary("assigned", n),
-                    "buildable": result.buildable[n],
+                    **({"buildable": result.buildable[n]} if result.buildable else {}),
                 }
                 for n, design in enumerate(result.designs)
             ],

@@ -134,6 +134,8 @@ def _summary(result: dict, units: Units | None) -> str:
     }
     if "loaded" in result:
         rows |= _under_load(result["loaded"], units)
+    for name, check in result.get("load_cases", {}).items():
+        rows[f"load case {name}"] = _carried(check, units)
     width = max(15, *map(len, rows))
     return "".join(f"{name:<{width}} {value}\n" for name, value in rows.items())
 
@@ -160,6 +162,25 @@ def _under_load(loaded: dict, units: Units | None) -> dict[str, str]:
         "stress, loaded": _stress(loaded["strength"], units),
         "stable, loaded": "yes" if loaded["stable"] else "no",
     }
+
+
+def _carried(check: dict, units: Units | None) -> str:
+    """Deflection, stress and stability under a load case, beside what is asked for."""
+    from ..units import with_unit
+
+    found = []
+    if check["deflection"] is not None:
+        found.append(f"deflection {with_unit(check['deflection'], 'length', units, 3)}")
+        if check["deflection_limit"] is not None:
+            allowed = with_unit(check["deflection_limit"], "length", units, 3)
+            found[-1] += f" of {allowed} allowed"
+    if check["utilisation"] is not None:
+        found.append(f"{100 * check['utilisation']:.3g} % of the elastic limit")
+    over = "over " if check["critical_factor_is_larger"] else ""
+    found.append(
+        f"critical factor {over}{check['critical_factor']:.3g}, {check['factor']:g} is asked for"
+    )
+    return "; ".join(found)
 
 
 def _stress(strength: dict, units: Units | None) -> str:

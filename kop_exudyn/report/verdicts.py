@@ -72,10 +72,10 @@ def verdict_lines(verdicts: Sequence[Buildable], units: Units | None = None) -> 
 
 
 def stopped(verdict: Buildable) -> str:
-    """What stops a design, in one sentence."""
-    some = "; ".join(map(str, verdict.stops[:_MOST_STOPS]))
+    """What stops a design, and what would help."""
+    some = ". Also ".join(map(str, verdict.stops[:_MOST_STOPS]))
     more = len(verdict.stops) - _MOST_STOPS
-    return f"{verdict.design}: {some}{f'; and {more} more' if more > 0 else ''}."
+    return f"{verdict.design}: {some}{f'. And {more} more' if more > 0 else ''}."
 
 
 def verdict_rows(
@@ -109,7 +109,7 @@ def verdict_rows(
             [
                 verdict.design,
                 "yes" if verdict.possible else "no",
-                verdict.moved_percent,
+                _moved(verdict),
                 verdict.largest,
                 verdict.softest,
                 None if kept is None else kept.spread_percent,
@@ -120,6 +120,12 @@ def verdict_rows(
             ]
         )
     return headings, rows
+
+
+def _moved(verdict: Buildable) -> float | str | None:
+    """How far from the state shown it opens, in %; what is below a thousandth is none."""
+    moved = verdict.moved_percent
+    return moved if moved is None or moved >= 1e-3 else "under 0.001"
 
 
 def _worst_load(verdict: Buildable) -> list[Any]:
@@ -135,7 +141,8 @@ def _worst_load(verdict: Buildable) -> list[Any]:
 def _cutting(verdict: Buildable) -> str | None:
     if verdict.fabrication is None:
         return None
-    return f"{len(verdict.fabrication)} problems" if verdict.fabrication else "fine"
+    count = len(verdict.fabrication)
+    return f"{count} problem{'s' if count > 1 else ''}" if count else "fine"
 
 
 def _margins(verdicts: Sequence[Buildable], units: Units | None) -> str:
