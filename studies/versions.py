@@ -7,8 +7,8 @@ How long both take for the same work, on the same machine, in turns: a first and
 
 Both are copied into a folder for the time of the study, so that nothing is compiled before. Times
 are processor times of processes of their own, medians over rounds in which one version follows the
-other; the least and the most ratio of a round say how far the machine can be trusted. Every version
-reads its own models, in its own format; whether both end in the same state is said.
+other; the least and the most ratio of a round say how far the machine can be trusted. Both read
+the other version's models; whether they end in the same state is said.
 """
 
 from __future__ import annotations
@@ -54,10 +54,8 @@ def main() -> None:
     study = Study.from_command_line(__doc__, __file__, rest)
     cases = QUICK if study.quick else CASES
     with tempfile.TemporaryDirectory() as folder:
-        this, other = (
-            copied(source, name, ROOT, Path(folder))
-            for name, source in (("this", str(ROOT)), ("other", chosen.other))
-        )
+        other = copied(chosen.other, "other", ROOT, Path(folder))
+        this = copied(str(ROOT), "this", ROOT, Path(folder), other.models)
         rows = list(tqdm(compared(cases, this, other), total=len(cases), disable=None))
     ratios = [row["ratio"] for row in rows if row["ratio"] is not None]
     outcome = f"This version takes {geometric_mean(ratios):.2f} of the other's, as a geometric mean"

@@ -40,17 +40,21 @@ class Case:
 
 @dataclass(frozen=True)
 class Version:
-    """A copy of a version in a folder of its own, without anything compiled."""
+    """A copy of a version in a folder of its own, without anything compiled.
+
+    models : folder of the designs that it is measured on
+    """
 
     name: str
     folder: Path
+    models: Path
 
     def measure(self, case: Case) -> tuple[float, float | None]:
         """Seconds of processor time (MiB for memory), and what tells the state.
 
         Raises RuntimeError with what the version said when it failed.
         """
-        model = self.folder / "models" / case.argument
+        model = self.models / case.argument
         argument = str(model) if model.is_file() else case.argument
         if case.script in ("cold", "warm"):
             if case.script == "cold":
@@ -78,7 +82,11 @@ class Version:
         }
         before = os.times()
         done = subprocess.run(
-            [sys.executable, *arguments], capture_output=True, text=True, env=settings
+            [sys.executable, *arguments],
+            capture_output=True,
+            text=True,
+            env=settings,
+            cwd=self.folder,  # Python looks there first
         )
         after = os.times()
         if done.returncode:
@@ -88,8 +96,12 @@ class Version:
         return seconds, done.stdout if "--json" in arguments else done.stdout.splitlines()[-1]
 
 
-def copied(source: str, name: str, repository: Path, folder: Path) -> Version:
+def copied(
+    source: str, name: str, repository: Path, folder: Path, models: Path | None = None
+) -> Version:
     """A version from a folder with its files, or from a commit of the repository.
+
+    models : default: its own
 
     Raises InputError when it is neither.
     """
@@ -99,7 +111,7 @@ def copied(source: str, name: str, repository: Path, folder: Path) -> Version:
             shutil.copytree(
                 Path(source) / part, target / part, ignore=shutil.ignore_patterns(*_MADE)
             )
-        return Version(name, target)
+        return Version(name, target, models or target / "models")
     done = subprocess.run(
         ["git", "archive", "--format=tar", source, *_PARTS], cwd=repository, capture_output=True
     )
@@ -107,7 +119,7 @@ def copied(source: str, name: str, repository: Path, folder: Path) -> Version:
         raise InputError("neither a folder nor a commit", field="--other", value=source)
     with tarfile.open(fileobj=BytesIO(done.stdout)) as archive:
         archive.extractall(target, filter="data")
-    return Version(name, target)
+    return Version(name, target, models or target / "models")
 
 
 def compared(cases: list[Case], this: Version, other: Version) -> Iterator[dict[str, Any]]:

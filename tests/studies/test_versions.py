@@ -33,6 +33,9 @@ def test_copies_have_nothing_compiled_and_other_sources_are_refused(repository, 
     version = copied(str(repository), "copy", repository, tmp_path)
     assert (version.folder / "models" / "small" / "01_sinh.json").is_file()
     assert not list(version.folder.rglob("__pycache__"))
+    file = version.folder / "kop_exudyn" / "__main__.py"  # what runs is the copy, from any folder
+    file.write_text('print("{\\"fit\\": {\\"max_percent\\": 7.0}}")\n')
+    assert version.measure(Case("a", "warm", "small/01_sinh.json"))[1] == 7.0
     with pytest.raises(InputError, match="neither a folder nor a commit"):
         copied("no-such-commit", "other", repository, tmp_path)
 
@@ -40,7 +43,7 @@ def test_copies_have_nothing_compiled_and_other_sources_are_refused(repository, 
 def test_what_fails_and_what_differs_is_said(tmp_path, monkeypatch):
     found = {"this": (1.0, 3.0), "other": (2.0, 3.1)}
     monkeypatch.setattr(Version, "measure", lambda self, case: found[self.name])
-    versions = Version("this", tmp_path), Version("other", tmp_path)
+    versions = tuple(Version(name, tmp_path, tmp_path) for name in ("this", "other"))
     (row,) = compared([Case("a", "iteration", "4")], *versions)
     assert row["ratio"] == 0.5 and row["same state"] == "no: 3 and 3.1"
 
