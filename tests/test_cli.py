@@ -8,6 +8,7 @@ import sys
 import time
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from kop_exudyn import __version__, cli
@@ -70,7 +71,7 @@ def design_file(monkeypatch, write_json_file):
         base.CLASSES.items,
         "named",
         lambda data, source: SimpleNamespace(
-            name=data["name"], fit_weight=1e5, stress_weight=0.0, units=None
+            middle=np.zeros(3), name=data["name"], fit_weight=1e5, stress_weight=0.0, units=None
         ),
     )
     return write_json_file(
@@ -285,7 +286,7 @@ class TestOptimize:
             def summary(stage, n):
                 return {"failed": "no"} if designs[n].name in asked["failed"] else {}
 
-            return SimpleNamespace(designs=designs, summary=summary)
+            return SimpleNamespace(designs=designs, summary=summary, buildable=(), verdict=())
 
         monkeypatch.setattr(kit_run, "optimize_and_report", optimize_and_report)
         return asked
