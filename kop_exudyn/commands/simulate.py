@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ..structures.base import Design
-    from ..structures.loads import LoadCase
     from ..units import Units
 
 HELP = "deploy one design and say how well it fits its target"
@@ -68,11 +67,11 @@ def run(args: argparse.Namespace) -> int:
     from ..io.designs import load_design
 
     design = load_design(args.design)
-    own: tuple[LoadCase, ...] = ()
+    loads = None
     if args.gravity is not None:
-        own = (replace(design.loads, gravity=_gravity(design, args)),)
+        loads = replace(design.loads, gravity=_gravity(design, args))
     try:
-        result = simulate(design, *own, engine=args.engine).to_dict()
+        result = simulate(design, loads, engine=args.engine).to_dict()
     except SimulationFailure as failure:
         if args.json:
             sys.stdout.write(to_json({"design": design.name, "failed": str(failure)}))

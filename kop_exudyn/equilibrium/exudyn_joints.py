@@ -245,7 +245,7 @@ class Joints:
                 frame = state.rotations[joint.body]
             else:
                 continue
-            if np.array_equal(frame, joint.set):
+            if joint.set is not None and np.array_equal(frame, joint.set):
                 continue
             joint.set = frame
             end = _End(joint.first.node, frame, joint.first.place)

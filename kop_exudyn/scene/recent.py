@@ -29,7 +29,7 @@ class Recent(Generic[T]):
         digest = hashlib.blake2b(digest_size=16)
         for array in arrays:
             digest.update(repr((array.shape, array.dtype.str)).encode())
-            digest.update(np.ascontiguousarray(array))
+            digest.update(np.ascontiguousarray(array).data)
         key = digest.digest()
         found = self._found.pop(key) if key in self._found else make()
         self._found[key] = found

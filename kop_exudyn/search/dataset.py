@@ -250,9 +250,10 @@ class Dataset:
 
     def judge(
         self,
-        calls: Mapping[int, tuple[np.ndarray, Mapping[str, Equilibrium], tuple[Equilibrium, ...]]],
+        calls: Mapping[int, tuple[Any, ...]],
     ) -> dict[int, Evaluation | SimulationFailure]:
-        """Evaluations of given parameters and equilibria, (q, {role: equilibrium}) a design."""
+        """Evaluations of given parameters, equilibria and, where known, the states on the way:
+        (q, {role: equilibrium}[, states]) a design."""
         return self._map(DesignObjective.judge, calls)
 
     def _map(

@@ -252,7 +252,8 @@ def _bounds(
     matrix : (n_q, n) derivative of the designs' parameters in the variables, default: the same
     """
     n_q = int(dataset.offsets[-1])
-    names, values, rows, number = [], [], [], []
+    names: list[tuple[str, str]] = []
+    values, rows, number = [], [], []
     for n, (design, found) in enumerate(zip(dataset.designs, designs)):
         for state, bound in found.bounds.items():
             wide = sp.csr_matrix(bound.jacobian)

@@ -302,9 +302,10 @@ def _damped(model: QuadraticModel, damping: float, solver: QPSolver, start) -> M
         return None
     pressure = np.zeros(0)
     if model.bounds is not None and model.excess(result.x[:n]).max(initial=0.0) > 0:
-        result, pressure = _solved_elastic(model, qp, solver, (result.x, y, z), result.wall_s)
-        if result is None:
+        found, pressure = _solved_elastic(model, qp, solver, (result.x, y, z), result.wall_s)
+        if found is None:
             return None
+        result = found
     u = result.x[:n]
     return ModelStep(
         u,

@@ -66,7 +66,7 @@ class Role:
     fitted: bool = False
 
 
-_WORKSPACES = ("systems", "way")  # attributes that are made anew in every process
+_MADE_ANEW = (_WORKSPACES, "way")  # in every process
 
 
 class Design(ABC):
@@ -163,7 +163,7 @@ class Design(ABC):
     def __getstate__(self) -> dict[str, Any]:
         """What travels to another process: everything but the solver workspaces, which are made
         anew there."""
-        return {key: value for key, value in self.__dict__.items() if key != _WORKSPACES}
+        return {key: value for key, value in self.__dict__.items() if key not in _MADE_ANEW}
 
     @cached_property
     def way(self) -> Way | None:

@@ -35,7 +35,7 @@ Map = Callable[[np.ndarray], np.ndarray]
 MAPS: dict[str, tuple[Map, float]] = {
     "sinh": (lambda z: np.sinh(0.64 * z + 0.2), 0.75),
     "tanh": (lambda z: np.tanh(0.56 * z), 0.80),
-    "exp": (lambda z: np.exp(0.48 * z), 0.70),
+    "exp": (lambda z: np.exp(0.48 * z), 0.60),
     "cubic": (lambda z: z + 0.077 * z**3, 0.60),
     "sine": (lambda z: np.sin(0.72 * z), 0.50),
     "moebius": (lambda z: z / (1 - 0.24 * z), 0.65),
