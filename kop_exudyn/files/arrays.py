@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import math
 import tokenize
@@ -9,11 +10,14 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 from .files import SIZE_LIMIT, read_bytes, write_bytes
+
+SEAL = "seal"
 
 
 def save_arrays(
@@ -64,6 +68,69 @@ def load_arrays(path: str | Path, limit: int = SIZE_LIMIT) -> dict[str, np.ndarr
         raise InputError(
             f"not a readable file of arrays: {_one_line(error)}", source=path
         ) from None
+
+
+def sealed(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The arrays with a seal: the SHA-256 of their names, kinds, shapes and contents."""
+    return {**arrays, SEAL: np.array(_digest(arrays))}
+
+
+def unsealed(
+    arrays: Mapping[str, np.ndarray], source: Any = None, *, needed: bool = True
+) -> dict[str, np.ndarray]:
+    """The arrays without their seal.
+
+    Raises InputError where it doesn't fit them: then they aren't what was written. Where it is
+    missing, only if it is needed: files of earlier versions have none.
+    """
+    found = dict(arrays)
+    seal = found.pop(SEAL, None)
+    if seal is None and not needed:
+        return found
+    if seal is None or seal.dtype.kind != "U" or str(seal) != _digest(found):
+        raise InputError("is damaged: it isn't what was written", source=source)
+    return found
+
+
+def numbers_of(
+    arrays: Mapping[str, np.ndarray],
+    name: str,
+    shape: tuple[int | None, ...],
+    *,
+    finite: bool = True,
+) -> np.ndarray:
+    """One of several arrays as contiguous floats.
+
+    shape : what it must have, None for any size
+
+    Raises InputError, naming the array, when it is missing, holds no numbers, is of another shape
+    or, unless that is allowed, not finite.
+    """
+    if name not in arrays:
+        raise InputError("is missing", field=name)
+    array = np.asarray(arrays[name])
+    fits = len(array.shape) == len(shape) and all(
+        size is None or size == given for size, given in zip(shape, array.shape)
+    )
+    if array.dtype.kind not in "fiu" or not fits:
+        wanted = ", ".join("any" if size is None else str(size) for size in shape)
+        raise InputError(
+            f"expected numbers of shape ({wanted}), got {array.dtype} of shape {array.shape}",
+            field=name,
+        )
+    array = np.ascontiguousarray(array, float).reshape(array.shape)
+    if finite and not np.isfinite(array).all():
+        raise InputError("contains numbers that are not finite", field=name)
+    return array
+
+
+def _digest(arrays: Mapping[str, np.ndarray]) -> str:
+    digest = hashlib.sha256()
+    for name in sorted(arrays):
+        array = np.asarray(arrays[name])
+        digest.update(f"{name}|{array.dtype.str}|{array.shape}|".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
 
 
 def _read(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> np.ndarray:

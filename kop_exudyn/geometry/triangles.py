@@ -13,6 +13,7 @@ from ..errors import InputError
 
 # Barycentric coordinates below this are zero: the closest point lies on an edge or a vertex.
 _ON_EDGE = 1e-10
+_LARGEST = 1e150  # of coordinates, whose squares don't overflow
 # A point belongs to a face when its offset from the surface is normal to the face up to these
 # errors.
 _NORMAL_ABSOLUTE, _NORMAL_RELATIVE = 1e-12, 1e-9
@@ -82,7 +83,9 @@ class TriangleSurface:
     def closest(self, points: np.ndarray) -> Closest:
         """Closest points of points (n, 3)."""
         points = np.ascontiguousarray(points, dtype=float)
-        if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
+        # beyond that squares overflow, and libigl names faces that don't exist
+        near = points.size == 0 or np.abs(points).max() < _LARGEST
+        if points.ndim != 2 or points.shape[1] != 3 or not near:
             raise InputError(
                 "expected finite points of shape (n, 3)", field="points", value=points.shape
             )

@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import __version__
 from ..errors import InputError
-from ..files.arrays import load_arrays, save_arrays
+from ..files.arrays import load_arrays, save_arrays, sealed, unsealed
 from ..files.documents import check_envelope
 from ..files.files import is_temporary, make_folder, read_bytes
 from ..files.json_files import plain, read_json, write_json
@@ -121,13 +121,13 @@ class CheckpointStore:
 
     def load(self, name: str) -> dict[str, np.ndarray] | None:
         """The arrays saved under a name, None when there are none. InputError when the file is
-        damaged."""
+        damaged: a run that went on from changed numbers would end in another kit."""
         path = self._path(name)
-        return load_arrays(path) if path.exists() else None
+        return unsealed(load_arrays(path), path) if path.exists() else None
 
     def save(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
         """Keep arrays under a name, in place of those before."""
-        save_arrays(self._path(name), arrays, overwrite=True)
+        save_arrays(self._path(name), sealed(arrays), overwrite=True)
 
     def names(self) -> list[str]:
         """What is kept, sorted."""

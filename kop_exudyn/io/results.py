@@ -11,7 +11,7 @@ import numpy as np
 
 from ..equilibrium.equilibria import Equilibrium
 from ..errors import InputError
-from ..files.arrays import load_arrays, save_arrays
+from ..files.arrays import load_arrays, save_arrays, sealed, unsealed
 from ..files.documents import check_envelope, check_schema
 from ..files.json_files import plain, read_json, write_json
 
@@ -60,17 +60,17 @@ def save_states(
             "torque": np.array(equilibrium.torque),
         }
         arrays |= {"/".join([*key, field]): array for field, array in values.items()}
-    return save_arrays(path, arrays, overwrite=overwrite)
+    return save_arrays(path, sealed(arrays), overwrite=overwrite)
 
 
 def load_states(path: str | Path) -> dict[tuple[str, str, str], dict[str, np.ndarray]]:
     """What `save_states` wrote: (design, stage, role) -> {"positions", "rotations", "angles",
     "parameters", "torque"}.
 
-    Files of earlier versions lack the last two.
+    Files of earlier versions lack the last two, and the seal that tells damage. Raises InputError.
     """
     found: dict[tuple[str, str, str], dict[str, np.ndarray]] = {}
-    for name, array in load_arrays(path).items():
+    for name, array in unsealed(load_arrays(path), path, needed=False).items():
         pieces = name.split("/")
         if len(pieces) != 4:
             raise InputError("not a file of final states", source=path, field=name)

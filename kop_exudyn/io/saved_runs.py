@@ -12,6 +12,7 @@ import numpy as np
 from ..equilibrium.equilibria import Equilibrium, Start
 from ..equilibrium.newton import solve
 from ..errors import InputError, SimulationFailure
+from ..files.arrays import numbers_of
 from ..kit.optimality import ClusteringGap
 from ..kit.parts import Assignment, Kit
 from ..scene.state import State
@@ -190,7 +191,8 @@ def _judged(
     if q is None:
         return None
     equilibria = {
-        role.name: _equilibrium(design, role, stage, q, saved[role.name]) for role in design.roles
+        role.name: saved_equilibrium(design, role, stage, q, saved[role.name])
+        for role in design.roles
     }
     return objective.judge(q, equilibria)
 
@@ -201,7 +203,7 @@ def _reference(design: Design, states: Mapping[tuple[str, str, str], Any]) -> Re
     if saved is None:
         return reference_of(design)
     equilibria = {
-        role.name: _equilibrium(design, role, INPUT, design.parameters, saved[role.name])
+        role.name: saved_equilibrium(design, role, INPUT, design.parameters, saved[role.name])
         for role in design.roles
     }
     return Reference(design.target, equilibria[design.fitted_role.name].elastic_energy, equilibria)
@@ -219,22 +221,29 @@ def _saved(
     return found if len(found) == len(design.roles) else None
 
 
-def _equilibrium(
+def saved_equilibrium(
     design: Design, role: Role, stage: str, q: np.ndarray, saved: Mapping[str, np.ndarray]
 ) -> Equilibrium:
-    """The equilibrium that a saved state is; InputError where it is none of this design."""
-    state = State(*(saved[field] for field in ("positions", "rotations", "angles")))
+    """The equilibrium that a saved state is.
+
+    stage : for messages; q : (n_parameters,); saved : as `load_states` has it
+
+    Raises InputError where it is damaged or none of this design, SimulationFailure where nothing is
+    found from it.
+    """
     scene = design.scene(role.name)
-    sizes = (scene.n_bodies, scene.n_hinges, len(design.parameters))
-    if (len(state.positions), len(state.angles), len(q)) != sizes:
+    try:
+        state = State.of(saved, scene.n_bodies, scene.n_hinges)
+        q = numbers_of({"parameters": q}, "parameters", (len(design.parameters),))
+        torque = float(numbers_of(saved, "torque", ())) if "torque" in saved else 0.0
+    except InputError as error:
         raise InputError(
-            "the saved states are of another version of this design",
+            "the saved states are damaged, or of another version of this design: "
+            f"{error.field} {error.message}",
             source=design.name,
             field=stage,
-        )
-    found = solve(
-        design.systems[role.name], q, Start(state, float(saved.get("torque", 0.0))), role.opening
-    )
+        ) from None
+    found = solve(design.systems[role.name], q, Start(state, torque), role.opening)
     if np.abs(found.state.positions - state.positions).max() > _SAME_PLACE * scene.size:
         raise InputError(
             "the saved states are no equilibria of this design", source=design.name, field=stage

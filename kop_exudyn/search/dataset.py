@@ -11,6 +11,7 @@ import numpy as np
 
 from ..equilibrium.equilibria import Equilibrium
 from ..errors import InputError, SimulationFailure
+from ..files.arrays import numbers_of
 from ..kit.groups import ElementGroup
 from ..kit.kinds import Bounds, part_kind
 from ..scene.state import State
@@ -314,28 +315,34 @@ def evaluations_to_arrays(evaluations: Sequence[Evaluation]) -> dict[str, np.nda
 
 
 def evaluations_from_arrays(dataset: Dataset, arrays: Mapping[str, np.ndarray]) -> list[Evaluation]:
-    """The evaluations that the arrays came from, judged anew (no equilibrium is solved)."""
+    """The evaluations that the arrays came from, judged anew (no equilibrium is solved).
+
+    Raises InputError, naming the array, where one doesn't fit the designs.
+    """
     calls = {}
     for n, design in enumerate(dataset.designs):
         equilibria = {}
+        q = numbers_of(arrays, f"{n}/q", design.parameters.shape)
         roles = [role.name for role in design.roles]
         stations = sum(key.startswith(f"{n}/way") and key.endswith("/numbers") for key in arrays)
         for role in (*roles, *(f"way{k}" for k in range(stations))):
             prefix = f"{n}/{role}/"
-            opening, *numbers = arrays[prefix + "numbers"].tolist()
-            state = State(
-                *(np.array(arrays[prefix + key]) for key in ("positions", "rotations", "angles"))
-            )
+            own = {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
+            scene = design.scene(role if role in roles else design.fitted_role.name)
+            count = 1 + len(_EQUILIBRIUM_NUMBERS)
+            opening, *numbers = numbers_of(own, "numbers", (count,), finite=False).tolist()
+            if not np.isfinite(numbers).all():
+                raise InputError("contains numbers that are not finite", field=prefix + "numbers")
             equilibria[role] = Equilibrium(
-                state=state,
-                q=np.array(arrays[f"{n}/q"]),
+                state=State.of(own, scene.n_bodies, scene.n_hinges),
+                q=q,
                 opening=None if np.isnan(opening) else opening,
-                stress=np.array(arrays[prefix + "stress"]),
+                stress=numbers_of(own, "stress", (len(scene.elements), 6)),
                 iterations=0,
                 escapes=0,
                 wall_s=0.0,
                 **dict(zip(_EQUILIBRIUM_NUMBERS, numbers)),
             )
         way = tuple(equilibria.pop(f"way{k}") for k in range(stations))
-        calls[n] = (np.array(arrays[f"{n}/q"]), equilibria, way)
+        calls[n] = (q, equilibria, way)
     return all_or_raise(list(dataset.judge(calls).values()))

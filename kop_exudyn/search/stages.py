@@ -13,6 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..errors import InputError, SimulationFailure
+from ..files.arrays import numbers_of
 from ..kit.cluster import cluster
 from ..kit.parts import Assignment, Kit
 from ..kit.projection import Projection
@@ -384,17 +385,18 @@ class Stages:
         terms: list[str] = []
         if saved is not None:
             try:
-                state, start, terms = _restored(problem, saved)
-                equilibria, iterations = saved["tally"].astype(int).tolist()
+                state, start, terms = _restored(problem, saved, start.x.shape)
+                equilibria, iterations = numbers_of(saved, "tally", (2,)).astype(int).tolist()
+                rows = [json.loads(row) for row in terms]
             # some array is missing or of another shape
-            except (IndexError, KeyError, TypeError, ValueError):
+            except (IndexError, KeyError, TypeError, ValueError, AttributeError):
                 raise InputError(
                     f"the checkpoint {name!r} is damaged: start anew instead of resuming"
                 ) from None
             tally.equilibria += equilibria
             tally.newton_iterations += iterations
-            for record, row in zip(state.history, terms):
-                self.observer(StageEvent(name, record, json.loads(row), weight))
+            for record, row in zip(state.history, rows):
+                self.observer(StageEvent(name, record, row, weight))
 
         def checkpoint(state: SQPState, point: Point) -> None:
             terms.append(json.dumps(point.data.terms))
@@ -494,14 +496,19 @@ def _pressure(result: SQPResult) -> dict[str, dict[str, float]]:
     return found
 
 
-def _restored(problem: Any, saved: Mapping[str, np.ndarray]) -> tuple[SQPState, Point, list[str]]:
-    """State, point and the steps' terms of a checkpoint."""
+def _restored(
+    problem: Any, saved: Mapping[str, np.ndarray], shape: tuple[int, ...]
+) -> tuple[SQPState, Point, list[str]]:
+    """State, point (of variables of this shape) and the steps' terms of a checkpoint."""
     state = SQPState.from_arrays({k[4:]: v for k, v in saved.items() if k.startswith("sqp/")})
+    if state.x.shape != shape or saved["terms"].shape != (len(state.history),):
+        raise ValueError("a checkpoint of other variables, or of other steps")
     evaluations = evaluations_from_arrays(
         problem.dataset, {k[7:]: v for k, v in saved.items() if k.startswith("states/")}
     )
+    kit = numbers_of(saved, "kit", (None,))
     point = (
-        problem.point(state.x, evaluations, problem.kit.with_vector(saved["kit"]))
+        problem.point(state.x, evaluations, problem.kit.with_vector(kit))
         if isinstance(problem, RelaxedProblem)
         else problem.point(state.x, evaluations)
     )

@@ -13,6 +13,8 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
+from ..errors import InputError
+
 # relative size of a denominator below which an SR1 update is skipped; Nocedal & Wright (2006), eq.
 # 6.26
 _SAFE = 1e-8
@@ -82,7 +84,11 @@ class SecantCorrection:
         return arrays
 
     def restore(self, arrays: dict[str, np.ndarray]) -> None:
-        """Take over what `to_arrays` gave for the same sizes."""
+        """Take over what `to_arrays` gave for the same sizes. Raises InputError for others."""
+        for k, size in enumerate(self._ends - self._starts):
+            vectors, factors = arrays[f"vectors{k}"], arrays[f"factors{k}"]
+            if vectors.shape != (len(factors), size):
+                raise InputError("curvature of other variables", field="quasi_newton")
         self._x = np.array(arrays["x"]) if len(arrays["x"]) else None
         self._gradient = np.array(arrays["gradient"])
         self._vectors = [np.array(arrays[f"vectors{k}"]) for k in range(len(self._vectors))]

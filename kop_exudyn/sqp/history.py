@@ -103,32 +103,64 @@ class SQPState:
         something else."""
         try:
             return cls._from_arrays(arrays)
+        except InputError as error:
+            raise InputError(error.message, field=f"sqp/{error.field}") from None
         # ValueError: also that of the JSON reader
-        except (KeyError, TypeError, ValueError) as error:
+        except (KeyError, TypeError, ValueError, RecursionError, AttributeError) as error:
             raise InputError(
                 f"not the state of an optimisation ({type(error).__name__})", field="sqp"
             ) from None
 
     @classmethod
     def _from_arrays(cls, arrays: dict[str, np.ndarray]) -> SQPState:
-        radius, step, evaluations, failures, gradient_scale, penalty = arrays["numbers"]
+        numbers = _numbers(arrays, "numbers", 6)
+        radius, step, evaluations, failures, gradient_scale, penalty = numbers.tolist()
+        # a radius without limit is infinite
+        counts = numbers[1:4]
+        if not (radius > 0 and (numbers >= 0).all() and np.isfinite(counts).all()):
+            raise ValueError("radii and counts can't be negative")
         quasi_newton = {
             name.removeprefix("quasi_newton."): np.array(arrays[name])
             for name in arrays
             if name.startswith("quasi_newton.")
         }
-        records = tuple(StepRecord(**record) for record in json.loads(str(arrays["history"])))
+        for name, array in quasi_newton.items():
+            if array.dtype.kind not in "bfiu" or not np.isfinite(array).all():
+                raise InputError("expected finite numbers", field=f"quasi_newton.{name}")
+        history = arrays["history"]
+        if history.dtype.kind != "U" or history.shape:
+            raise ValueError("the history isn't a text")
+        records = tuple(StepRecord(**record) for record in json.loads(str(history)))
+        if len(records) != step:
+            raise ValueError(f"{len(records)} records of {step:g} steps")
         return cls(
-            np.array(arrays["x"]),
+            _finite(arrays, "x"),
             float(radius),
             int(step),
             int(evaluations),
             int(failures),
             float(gradient_scale),
-            np.array(arrays["y"]),
-            np.array(arrays["z"]),
+            _finite(arrays, "y"),
+            _finite(arrays, "z"),
             float(penalty),
-            np.array(arrays["pressure"]),
+            _finite(arrays, "pressure"),
             quasi_newton,
             records,
         )
+
+
+def _numbers(arrays: dict[str, np.ndarray], name: str, count: int | None = None) -> np.ndarray:
+    """(count,) one of the arrays, as floats. Raises InputError for another kind or shape."""
+    array = np.asarray(arrays[name])
+    if array.dtype.kind not in "fiu" or array.ndim != 1 or count not in (None, len(array)):
+        raise InputError(
+            f"expected numbers in one row, got {array.dtype} of {array.shape}", field=name
+        )
+    return np.array(array, float)
+
+
+def _finite(arrays: dict[str, np.ndarray], name: str) -> np.ndarray:
+    array = _numbers(arrays, name)
+    if not np.isfinite(array).all():
+        raise InputError("contains numbers that are not finite", field=name)
+    return array

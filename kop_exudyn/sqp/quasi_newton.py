@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
+from ..errors import InputError
+
 # Powell's bound on the curvature that an update may remove; Nocedal & Wright (2006), procedure 18.2
 _POWELL = 0.2
 # of the whole step, in scaled variables: a block that moved less learns nothing
@@ -70,7 +72,13 @@ class BlockBFGS:
         return arrays | {f"block{k}": block.copy() for k, block in enumerate(self._blocks or [])}
 
     def restore(self, arrays: dict[str, np.ndarray]) -> None:
-        """Take over what ``to_arrays`` gave for the same sizes."""
+        """Take over what ``to_arrays`` gave for the same sizes. Raises InputError for others."""
+        sizes = (self._ends - self._starts).tolist()
+        shapes = {"updated": (len(sizes),)} | {f"block{k}": (m, m) for k, m in enumerate(sizes)}
+        if arrays["x"].shape != arrays["gradient"].shape or any(
+            name in arrays and arrays[name].shape != shape for name, shape in shapes.items()
+        ):
+            raise InputError("curvature of other variables", field="quasi_newton")
         self._updated = np.array(arrays["updated"], dtype=bool)
         self._x, self._gradient = np.array(arrays["x"]), np.array(arrays["gradient"])
         blocks = [

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kop_exudyn.errors import InputError
-from kop_exudyn.files.arrays import load_arrays, save_arrays
+from kop_exudyn.files.arrays import load_arrays, save_arrays, unsealed
 from kop_exudyn.io.results import load_result, save_result, save_states
 from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.report.kit_drawings import final_states, histories, summary_rows
@@ -143,7 +143,7 @@ def test_folders_of_earlier_versions(finished, shells, tmp_path):
     result, folder = finished
     old = {
         name: array
-        for name, array in load_arrays(folder / "states.npz").items()
+        for name, array in unsealed(load_arrays(folder / "states.npz")).items()
         if name.split("/")[1] != "input" and name.split("/")[3] not in ("parameters", "torque")
     }
     save_arrays(tmp_path / "states.npz", old)

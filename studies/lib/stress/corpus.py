@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kop_exudyn.files.arrays import save_arrays
+from kop_exudyn.files.arrays import save_arrays, sealed
 from kop_exudyn.kit.parts import Kit
 from kop_exudyn.structures.umbrella.generator import parallelogram_patch
 from kop_exudyn.structures.umbrella.layout import BaseMesh, Plates, umbrella_mesh
@@ -107,7 +107,7 @@ def corpus(folder: Any) -> dict[str, bytes]:
 
 
 def _archive(folder: Any, arrays: dict[str, np.ndarray]) -> bytes:
-    return save_arrays(folder / "scratch.npz", arrays, overwrite=True).read_bytes()
+    return save_arrays(folder / "scratch.npz", sealed(arrays), overwrite=True).read_bytes()
 
 
 def _c_shell(kind: str) -> dict[str, Any]:
@@ -277,7 +277,7 @@ def _states() -> dict[str, np.ndarray]:
 def _checkpoint() -> dict[str, np.ndarray]:
     from kop_exudyn.sqp.history import SQPState
 
-    state = SQPState(np.linspace(0, 1, 6), 0.5, step=2, y=np.zeros(0), z=np.zeros(6))
+    state = SQPState(np.linspace(0, 1, 6), 0.5, step=0, y=np.zeros(0), z=np.zeros(6))
     return {
         **{f"sqp/{name}": value for name, value in state.to_arrays().items()},
         "kit": np.ones(4),
