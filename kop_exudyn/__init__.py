@@ -17,6 +17,8 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:  # the same names, for type checkers and editors
     from .analysis.simulation import SimulationResult as SimulationResult
     from .analysis.simulation import simulate as simulate
+    from .equilibrium.path import PathOptions as PathOptions
+    from .equilibrium.path import trace_path as trace_path
     from .equilibrium.sensitivities import Sensitivities as Sensitivities
     from .errors import InputError as InputError
     from .errors import SimulationFailure as SimulationFailure
@@ -62,6 +64,7 @@ _PUBLIC = {
         "JobSettings",
         "StageSettings",
     ),
+    "equilibrium.path": ("PathOptions", "trace_path"),
     "equilibrium.sensitivities": ("Sensitivities",),
     "search.result": ("KitResult",),
     "analysis.simulation": ("SimulationResult", "simulate"),

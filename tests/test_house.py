@@ -156,3 +156,21 @@ def test_a_circle_is_seen(tmp_path):
     (package / "c.py").write_text("from . import a\n")
     (package / "d.py").write_text("from .a import x\n")
     assert circles(arrows(package)) == [["a", "b", "c"]]
+
+
+def test_no_module_is_without_a_caller(repository):
+    """Reached from the commands, the public names, or what a registry loads by its folder."""
+    import kop_exudyn
+
+    package = repository / "kop_exudyn"
+    graph = arrows(package)
+    registries = ("structures", "kit", "search.terms", "commands")
+    start = {"cli", "__main__", *kop_exudyn._PUBLIC}
+    start |= {name for name in graph if name.rpartition(".")[0] in registries}
+    seen: set[str] = set()
+    while start:
+        name = start.pop()
+        seen.add(name)
+        folders = {name.rsplit(".", k)[0] for k in range(1, name.count(".") + 1)}
+        start |= (graph[name] | folders) - seen
+    assert sorted(graph.keys() - seen) == []

@@ -125,7 +125,7 @@ class Path:
         raise SimulationFailure(f"no {kind} point on a path of {len(self.points)} points")
 
 
-def trace(
+def trace_path(
     scene: Scene,
     q: np.ndarray,
     load: Any = None,
@@ -140,6 +140,8 @@ def trace(
 
     Parameters
     ----------
+    scene : what is simulated
+    q : (n_parameters,) its parameters
     load : the term to be multiplied, in addition to the scene's own; None: the torque of the
         scene's actuation, whose displacement is the opening angle and whose factor is minus the
         multiplier of `solve`

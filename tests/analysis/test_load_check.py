@@ -10,7 +10,7 @@ import pytest
 
 from kop_exudyn.analysis.load_check import carrying_thickness, check_load, critical_factor
 from kop_exudyn.analysis.loading import held_scene
-from kop_exudyn.equilibrium.path import PathOptions, trace
+from kop_exudyn.equilibrium.path import PathOptions, trace_path
 from kop_exudyn.errors import InputError
 from kop_exudyn.scene.loads import DeadForces
 from kop_exudyn.structures.base import design_from_dict
@@ -48,7 +48,7 @@ def pushed(force: float, **more) -> LoadCase:
 def first_bifurcation(dome, opened):
     """The factor of a unit load at which the arc-length path first meets a singular stiffness."""
     _, held = held_scene(dome, opened, pushed(1.0))
-    path = trace(
+    path = trace_path(
         held,
         opened.q,
         DeadForces(dome.joints[[MIDDLE]], [[0, 0, -1.0]]),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kop_exudyn.equilibrium.newton import solve
-from kop_exudyn.equilibrium.path import PathOptions, trace
+from kop_exudyn.equilibrium.path import PathOptions, trace_path
 from kop_exudyn.equilibrium.stability import softest_mode
 from kop_exudyn.equilibrium.system import System
 from kop_exudyn.errors import SimulationFailure
@@ -71,7 +71,7 @@ def test_two_bars_against_the_closed_form():
     """The element's axial strain with its ends' axes held: u = A p, whose x part is the chord along
     the rest axis."""
     rise = 0.1
-    path = trace(
+    path = trace_path(
         truss(rise),
         np.zeros(0),
         DeadForces([1], [0, 0, -1.0]),
@@ -91,7 +91,7 @@ def test_an_actuated_scene_is_traced_in_its_torque(net):
     case = net(5)
     system = System(case.scene)
     start = solve(system, case.q, opening=case.opening - 0.1)
-    path = trace(
+    path = trace_path(
         case.scene,
         case.q,
         stop=lambda p: p.displacement < case.opening - 0.5,
@@ -114,7 +114,7 @@ def test_an_actuated_scene_is_traced_in_its_torque(net):
 
 
 def test_euler_load_is_found_as_a_bifurcation():
-    path = trace(
+    path = trace_path(
         column(),
         np.zeros(0),
         DeadForces([8], [-1.0, 0, 0]),
@@ -135,7 +135,7 @@ def test_euler_load_is_found_as_a_bifurcation():
 
 
 def test_the_imperfect_column_has_no_critical_point():
-    path = trace(
+    path = trace_path(
         column(0.02), np.zeros(0), DeadForces([8], [-1.0, 0, 0]), stop=lambda p: p.factor > 3
     )
     assert path.critical == () and all(p.stable for p in path.points)
@@ -144,7 +144,7 @@ def test_the_imperfect_column_has_no_critical_point():
 def test_points_are_equilibria_and_eigenvalues_agree():
     """A shallow arch: every point's stability is that of its softest eigenvalue."""
     scene, load = arch()
-    path = trace(scene, np.zeros(0), load, stop=lambda p: p.displacement > 0.12)
+    path = trace_path(scene, np.zeros(0), load, stop=lambda p: p.displacement > 0.12)
     assert [c.kind for c in path.critical] == ["limit", "limit"]
     assert any(not p.stable for p in path.points)
     for point in path.points:
@@ -162,10 +162,10 @@ def test_points_are_equilibria_and_eigenvalues_agree():
 
 def test_a_limit_point_is_where_the_factor_is_extreme():
     scene, load = arch()
-    path = trace(scene, np.zeros(0), load, stop=lambda p: p.displacement > 0.12)
+    path = trace_path(scene, np.zeros(0), load, stop=lambda p: p.displacement > 0.12)
     top, bottom = path.critical
     assert top.point.factor >= path.factors[path.displacements < 0].max() - 1e-9
-    finer = trace(
+    finer = trace_path(
         scene,
         np.zeros(0),
         load,
@@ -185,9 +185,9 @@ def test_a_limit_point_is_where_the_factor_is_extreme():
 
 def test_it_can_be_traced_backwards():
     scene, load = arch()
-    there = trace(scene, np.zeros(0), load, stop=lambda p: p.displacement > 0.12)
+    there = trace_path(scene, np.zeros(0), load, stop=lambda p: p.displacement > 0.12)
     end = there.points[-1]
-    back = trace(
+    back = trace_path(
         scene,
         np.zeros(0),
         load,
@@ -230,13 +230,15 @@ def arch(n: int = 12):
 def test_misuse_and_dead_ends(net):
     scene, load = arch()
     with pytest.raises(ValueError):
-        trace(scene, np.zeros(0), stop=lambda p: True)
+        trace_path(scene, np.zeros(0), stop=lambda p: True)
     case = net(3)
     with pytest.raises(ValueError):
-        trace(case.scene, case.q, load, stop=lambda p: True)
+        trace_path(case.scene, case.q, load, stop=lambda p: True)
     with pytest.raises(SimulationFailure, match="doesn't end"):
-        trace(scene, np.zeros(0), load, stop=lambda p: False, options=PathOptions(max_points=5))
+        trace_path(
+            scene, np.zeros(0), load, stop=lambda p: False, options=PathOptions(max_points=5)
+        )
     with pytest.raises(SimulationFailure, match="no work"):
-        trace(scene, np.zeros(0), DeadForces([0], [0, 0, 1.0]), stop=lambda p: False)
+        trace_path(scene, np.zeros(0), DeadForces([0], [0, 0, 1.0]), stop=lambda p: False)
     with pytest.raises(SimulationFailure, match="no turning point"):
-        trace(scene, np.zeros(0), load, stop=lambda p: p.displacement > 0.12).first("turning")
+        trace_path(scene, np.zeros(0), load, stop=lambda p: p.displacement > 0.12).first("turning")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kop_exudyn.equilibrium.newton import NewtonOptions, solve
-from kop_exudyn.equilibrium.path import PathOptions, trace
+from kop_exudyn.equilibrium.path import PathOptions, trace_path
 from kop_exudyn.equilibrium.system import System
 from kop_exudyn.rods.sections import Material, rectangle
 from kop_exudyn.scene.builder import SceneBuilder
@@ -36,7 +36,7 @@ def test_euler_columns(rods, classical, held, effective):
     bodies = rods.add(builder, 32, [0, 0, 0], np.eye(3), 1.0, [RIGID, RIGID, RIGID, 1.0, 1.0, 1.0])
     builder.pin(0)
     builder.pin(bodies[-1], held)
-    path = trace(
+    path = trace_path(
         builder.build(),
         rods.none,
         DeadForces(bodies[-1:], [-1.0, 0, 0]),
@@ -63,7 +63,7 @@ def test_lateral_buckling_of_a_strip(rods, classical):
     builder = SceneBuilder()
     bodies = rods.add(builder, 24, [0, 0, 0], np.eye(3), 1.0, [1e9, 1e9, 1e9, GJ, 1e6, EI])
     builder.pin(0)
-    path = trace(
+    path = trace_path(
         builder.build(),
         rods.none,
         DeadForces(bodies[-1:], [0, 0, -1.0]),
@@ -105,7 +105,7 @@ def test_right_angle_frame(rods, classical):
     1.09. 24 elements a leg: within 0.5 %.
     """
     scene, end = right_angle_frame(rods, 24)
-    path = trace(
+    path = trace_path(
         scene,
         rods.none,
         DeadForces([end], [1.0, 0, 0]),
@@ -157,7 +157,7 @@ def test_twisted_straight_rod(rods, classical):
     builder.pin(bodies[0])
     builder.pin(end[0], (0, 1, 3, 4, 5))
     scene = builder.build()
-    path = trace(
+    path = trace_path(
         scene,
         rods.none,
         HingeTorques(hinge, 1.0, scene.n_bodies),
@@ -195,7 +195,7 @@ def test_twisted_ring(rods, classical):
     # the plane may turn about the tangent at the joint: a rigid motion, as a ring has no side
     builder.pin(n // 2, (2,))
     scene = builder.build()
-    path = trace(
+    path = trace_path(
         scene,
         rods.none,
         HingeTorques(hinge, 1.0, scene.n_bodies),

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 from kop_exudyn.equilibrium.newton import solve
-from kop_exudyn.equilibrium.path import trace
+from kop_exudyn.equilibrium.path import trace_path
 from kop_exudyn.equilibrium.sensitivities import Sensitivities
 from kop_exudyn.equilibrium.system import System
 from kop_exudyn.rods.sections import Material, rectangle
@@ -75,7 +75,7 @@ def test_williams_toggle(rods, classical):
     """Limit load by beam-column theory 33.85, within 0.2 % (32 elements a leg); 34.04 is often
     quoted (1 %)."""
     scene, load = star(rods, 2, 32)
-    path = trace(scene, rods.none, load, stop=lambda p: p.displacement > 0.15)
+    path = trace_path(scene, rods.none, load, stop=lambda p: p.displacement > 0.15)
     top, bottom = path.critical
     assert (top.kind, bottom.kind) == ("limit", "limit")
     assert top.point.factor == pytest.approx(2 * shallow_limit(), rel=2e-3)
@@ -99,8 +99,8 @@ def test_star_dome(rods, classical):
     """Six legs share the load of a symmetric path evenly: three toggles, and no earlier
     bifurcation."""
     scene, load = star(rods, 6, 16)
-    dome = trace(scene, rods.none, load, stop=lambda p: p.displacement > 0.15)
-    toggle = trace(*_toggle(rods, 16), stop=lambda p: p.displacement > 0.15)
+    dome = trace_path(scene, rods.none, load, stop=lambda p: p.displacement > 0.15)
+    toggle = trace_path(*_toggle(rods, 16), stop=lambda p: p.displacement > 0.15)
     assert [c.kind for c in dome.critical] == ["limit", "limit"]
     assert [c.point.factor for c in dome.critical] == pytest.approx(
         [3 * c.point.factor for c in toggle.critical], rel=1e-5
@@ -125,7 +125,9 @@ def test_the_solver_snaps_beyond_the_limit_load(rods):
     equilibria."""
     scene, load = star(rods, 6, 8)
     limit = (
-        trace(scene, rods.none, load, stop=lambda p: p.displacement > 0).first("limit").point.factor
+        trace_path(scene, rods.none, load, stop=lambda p: p.displacement > 0)
+        .first("limit")
+        .point.factor
     )
     heights = []
     for share in (0.98, 1.02):
@@ -140,7 +142,7 @@ def test_driven_through_the_limit_point(rods):
     """With its apex led down the toggle is stable throughout, and its reaction is the path's load
     factor."""
     scene, load = star(rods, 2, 8)
-    path = trace(scene, rods.none, load, stop=lambda p: p.displacement > 0.15)
+    path = trace_path(scene, rods.none, load, stop=lambda p: p.displacement > 0.15)
     builder = SceneBuilder(1)
     apex = builder.bodies([[0, 0, RISE]])[0]
     for k in range(2):
@@ -190,7 +192,7 @@ def test_deep_arch(rods, classical):
         builder.pin(bodies[-1], (0, 1, 2, 3, 5))
         rods.hold_plane(builder, bodies[1:-1], 1)
         crown = bodies[n // 2]
-        path = trace(
+        path = trace_path(
             builder.build(),
             rods.none,
             DeadForces([crown], [0, 0, -1.0]),
@@ -219,7 +221,7 @@ def test_lee_frame(rods, classical):
     for end in (column[0], rest[-1]):
         builder.pin(end, (0, 1, 2, 3, 5))
     rods.hold_plane(builder, [*column[1:], *short[1:], *rest[1:-1]], 1)
-    path = trace(
+    path = trace_path(
         builder.build(),
         rods.none,
         DeadForces(short[-1:], [0, 0, -1.0]),
