@@ -79,11 +79,12 @@ def test_no_rest_state_without_actuation(grid, shell, calls):
 
 def test_no_bordered_system_without_an_angle_constraint(grid, shell, calls):
     equilibrium = solve(System(grid.scene("deployed")), changed(grid))
-    assert calls["solve"] == equilibrium.iterations
+    # one more looks for a mode without stiffness in the end
+    assert calls["solve"] == equilibrium.iterations + 1
     calls.clear()
     rest = next(role for role in shell.roles if not role.fitted)
     equilibrium = solve(System(shell.scene(rest.name)), changed(shell), opening=rest.opening)
-    assert calls["solve"] > equilibrium.iterations  # the border is a second right-hand side
+    assert calls["solve"] > equilibrium.iterations + 1  # the border is a second right-hand side
 
 
 def test_no_sensitivities_and_no_exudyn_in_a_line_search(shell, calls):
