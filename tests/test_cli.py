@@ -85,7 +85,7 @@ def simulated(monkeypatch):
     """Replaces the simulation by a known answer, or by an error put into the dict."""
     outcome = {}
 
-    def simulate(design, engine):
+    def simulate(design, loads=None, engine="fast"):
         if "error" in outcome:
             raise outcome["error"]
         return SimpleNamespace(to_dict=lambda: ANSWER)
@@ -520,7 +520,8 @@ def test_a_reader_that_stops_early_is_no_error(joints):
         "from kop_exudyn.io import designs",
         "designs.load_design = lambda path: SimpleNamespace(units=None)",
         f"answer = {{'joints': [[0.0] * 3] * {joints}}}",
-        "simulation.simulate = lambda design, engine: SimpleNamespace(to_dict=lambda: answer)",
+        "result = SimpleNamespace(to_dict=lambda: answer)",
+        "simulation.simulate = lambda design, loads, engine: result",
         "sys.exit(cli.main(['simulate', 'x', '--json']))",
     ]
     process = subprocess.Popen(

@@ -14,6 +14,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ..errors import InputError
+
 WELD = 1e-6  # of the size: vertices this near to each other are one
 _MOST_CUTS = 1000  # faces beside empty ones; of more, the empty ones are only left out
 _EMPTY = 1e-9  # of the longest side: a face lower than that has no area
@@ -28,6 +30,13 @@ def cleaned(
     tolerance : of the size, within which vertices are welded
     """
     notes = []
+    wrong = (faces < 0) | (faces >= len(vertices))
+    if wrong.any():
+        raise InputError(
+            f"names a vertex that isn't there (there are {len(vertices)})",
+            field="faces",
+            value=int(faces[wrong][0]),
+        )
     used = np.unique(faces)
     size = float(np.linalg.norm(np.ptp(vertices[used], axis=0))) if len(used) else 0.0
     places, faces = welded(vertices, faces, tolerance * size)

@@ -66,7 +66,7 @@ def test_python_lines_do_what_the_pages_say(name, least, tmp_path, monkeypatch):
 
 def test_the_study_file_of_the_how_to_page(tmp_path):
     page = (ROOT / "docs" / "howto.md").read_text(encoding="utf-8")
-    (content,) = re.findall(r"^```toml\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    content, *_ = re.findall(r"^```toml\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
     shutil.copytree(ROOT / "models" / "small", tmp_path, dirs_exist_ok=True)
     (tmp_path / "study.toml").write_text(content, encoding="utf-8")
     study = load_study(tmp_path / "study.toml")

@@ -20,6 +20,7 @@ class Named:
     name: str
     content: dict
     units: None = None
+    middle: object = 0.0
 
 
 @pytest.fixture

@@ -140,7 +140,7 @@ class TestArrays:
     ],
 )
 def test_states_of_something_else(arrays):
-    with pytest.raises(InputError, match="not the state of an optimisation"):
+    with pytest.raises(InputError, match="sqp"):
         SQPState.from_arrays(arrays)
 
 

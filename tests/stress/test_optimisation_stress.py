@@ -153,13 +153,17 @@ def test_kits_that_the_designs_are_not_made_for(part, built, caplog):
 @pytest.mark.parametrize(
     "pieces, message",
     [
-        (np.full((5, 2), np.nan), "rest length of element 0 is nan"),
         (np.full((5, 2), -0.1), "not positive"),
     ],
 )
 def test_inputs_that_can_not_be_simulated(pieces, message):
     with pytest.raises(SimulationFailure, match=f"bad: input design: .*{message}"):
         run([*arches(1), Arch("bad", pieces, 0.5)], 2)
+
+
+def test_inputs_that_are_no_numbers_are_refused():
+    with pytest.raises(InputError, match="must be finite numbers"):
+        run([*arches(1), Arch("bad", np.full((5, 2), np.nan), 0.5)], 2)
 
 
 class TestWorkers:

@@ -20,9 +20,7 @@ from kop_exudyn.files.json_files import write_json
 from .arch import arch_data
 
 # `kop` itself, with the class of the stress tests known to it
-_PROGRAM = (
-    "import sys, kop_exudyn.analysis.stress.arch; from kop_exudyn.cli import main; sys.exit(main())"
-)
+_PROGRAM = "import sys, lib.stress.arch; from kop_exudyn.cli import main; sys.exit(main())"
 # all in a result that may differ between two runs of one job
 _TIMES = {"wall_s", "peak_memory_mb", "seconds"}
 
