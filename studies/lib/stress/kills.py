@@ -4,6 +4,7 @@ the end."""
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -21,6 +22,7 @@ from .arch import arch_data
 
 # `kop` itself, with the class of the stress tests known to it
 _PROGRAM = "import sys, lib.stress.arch; from kop_exudyn.cli import main; sys.exit(main())"
+_STUDIES = Path(__file__).resolve().parents[2]
 # all in a result that may differ between two runs of one job
 _TIMES = {"wall_s", "peak_memory_mb", "seconds"}
 
@@ -53,6 +55,7 @@ def start(designs: Path, out: Path, jobs: int = 1, parts: str = "linear=2") -> s
         ],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(map(str, (_STUDIES.parent, _STUDIES)))},
     )
 
 
