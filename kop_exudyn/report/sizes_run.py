@@ -24,7 +24,7 @@ from ..search.settings import JobSettings
 from ..structures.base import Design
 from .environment import environment
 from .kit_report import write_kit_report
-from .kit_run import progress_bar
+from .kit_run import progress_bar, within_workshop
 from .page import Page
 from .tradeoff_drawing import draw_tradeoff
 from .verdicts import give_verdicts
@@ -57,11 +57,13 @@ def smallest_and_report(
     Parameters
     ----------
     designs, limit, first, cost, settings, accepts : see `smallest_kit`
-    out, inputs, resume, overwrite, progress : see `optimize_and_report`
+    out, inputs, resume, overwrite, progress : see `optimize_and_report`, also for the workshop's
+        bounds on parts
 
     Returns the kit and whether it keeps the limit; where none does, the one that deviates least.
     Raises InputError and SimulationFailure as `optimize_and_report`.
     """
+    settings = within_workshop(designs, settings)
     asked = {"max_deviation": limit, "cost": asdict(cost)}
     with _prepared(
         designs, first, settings, asked, out, inputs, resume, overwrite, progress
@@ -117,10 +119,12 @@ def tradeoff_and_report(
     ----------
     designs, sizes, settings : see `trade_off`
     cost : shown with every kit
-    out, inputs, resume, overwrite, progress : see `optimize_and_report`
+    out, inputs, resume, overwrite, progress : see `optimize_and_report`, also for the workshop's
+        bounds on parts
 
     Raises InputError and SimulationFailure as `optimize_and_report`.
     """
+    settings = within_workshop(designs, settings)
     asked = {"sizes": [dict(size) for size in sizes]}
     with _prepared(
         designs, sizes[-1], settings, asked, out, inputs, resume, overwrite, progress

@@ -3,13 +3,17 @@
 import csv
 import json
 
+import numpy as np
 import pytest
 from support.zigzags import zigzags
 
 from kop_exudyn.errors import InputError
+from kop_exudyn.fabrication.limits import part_bounds
 from kop_exudyn.io.checkpoint import CheckpointStore
+from kop_exudyn.io.designs import load_design
 from kop_exudyn.io.kits import load_kit
 from kop_exudyn.io.results import load_result
+from kop_exudyn.report import sizes_run
 from kop_exudyn.report.sizes_run import smallest_and_report, tradeoff_and_report
 from kop_exudyn.search.settings import JobSettings, StageSettings
 
@@ -69,3 +73,27 @@ def test_the_smallest_kit_and_its_report(tmp_path):
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "The smallest kit found that keeps every design within 50 %" in page
     assert len(shown(tmp_path)) == 2
+
+
+@pytest.mark.parametrize("run", ["smallest", "tradeoff"])
+def test_parts_keep_to_what_the_workshop_asks_of_them(repository, tmp_path, monkeypatch, run):
+    """As in a search for one kit; the job that a folder is resumed for says so as well."""
+    designs = [load_design(repository / "models" / "small" / "03_exp.json")]
+    wanted = part_bounds(designs)
+    seen = []
+
+    def searched(*arguments, settings, **others):
+        seen.append(settings.stages.bounds)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sizes_run, "smallest_kit", searched)
+    monkeypatch.setattr(sizes_run, "trade_off", searched)
+    with pytest.raises(KeyboardInterrupt):
+        if run == "smallest":
+            smallest_and_report(designs, 1.0, SIZES[0], out=tmp_path, settings=SETTINGS)
+        else:
+            tradeoff_and_report(designs, SIZES, out=tmp_path, settings=SETTINGS)
+    assert set(seen[0]) == {"linear", "angular"}
+    for kind, sides in wanted.items():
+        for side, own in zip(sides, seen[0][kind]):
+            assert np.array_equal(side, own)
