@@ -134,10 +134,7 @@ def parts(shells, clustering):
 
 # Faults that are known and not mended yet, each with what is wrong: the tests stay as they are, and
 # an entry goes when its fault does.
-_HELD_TURNS = "Exudyn's model holds bodies at the scene's turns, these are wound on from there"
 KNOWN_FAULTS = {
-    "test_a_straight_rod_wound_to_a_helix": _HELD_TURNS,
-    "test_placement_and_load_steps_do_not_matter": _HELD_TURNS,
     "test_opening_path_closes_step_by_step": "small C-shells are assembled flat now",
     "test_exudyn_deploys_a_design_of_every_class[small/01_sinh]": (
         "Exudyn alone opens this design into another state than the fast solver, since C-shells "
@@ -146,7 +143,6 @@ KNOWN_FAULTS = {
     "test_export_writes_a_labelled_drawing_of_every_design": "files have new names",
     "test_sheets_holes_and_single_folders": "sheets have other margins since the book",
     "test_exported_vtu_has_strains_stresses_and_utilisation": "meshio writes compressed VTU files",
-    "test_the_quick_mode_finds_nothing_wrong": _HELD_TURNS,
     "test_commands_print_what_the_page_shows": "the page's figures wait for another run",
     "test_quick_failure_and_rescue": "nothing snaps in the quick cases with the present models",
     "test_starting_from_a_larger_kit_is_better_than_from_scratch": (

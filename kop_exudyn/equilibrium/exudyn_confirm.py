@@ -15,13 +15,13 @@ from time import perf_counter
 import numpy as np
 
 from ..errors import SimulationFailure
-from ..rods.rotations import log_so3
+from ..rods.rotations import exp_so3, log_so3
 from ..scene.scene import Scene
 from ..scene.state import State
 from .equilibria import Equilibrium
 from .exudyn_joints import Condition
 from .exudyn_library import exu
-from .exudyn_model import ExudynModel, Residual
+from .exudyn_model import ExudynModel, Point, Residual
 
 # Residual, relative to the largest force in a rod, at which Exudyn's solution is accepted,
 TOLERANCE = 1e-7
@@ -123,13 +123,14 @@ def confirm(
         state = model.state(point)
         moved, turned = _distance(start, state, scene.size)
         if not max(moved, turned) < _MAX_MOVE:
-            _check_gaps(gaps_of(model, model.residual(model.point(start, equilibrium.torque))))
+            given = model.point(start, equilibrium.torque)
+            _check_gaps(gaps_of(model, model.residual(given), given))
             raise SimulationFailure(
                 f"Exudyn's static solver moved the state by {moved:.2e} of the size and turned it "
                 f"by {turned:.2e} rad"
             )
         if _small(model, largest, force):
-            _check_gaps(gaps := gaps_of(model, residual))
+            _check_gaps(gaps := gaps_of(model, residual, point))
             seconds = perf_counter() - begin
             return Confirmation(
                 exu.__version__, step, largest / force, gaps, moved, turned, seconds, state
@@ -150,8 +151,11 @@ def balance_of(model: ExudynModel, residual: Residual) -> tuple[float, float]:
     return float(np.abs(residual.balance).max()), max(model.largest_force(), model.round_off)
 
 
-def gaps_of(model: ExudynModel, residual: Residual) -> dict[str, float]:
-    """By how much each kind of condition is broken, rad or relative to the scene's size."""
+def gaps_of(model: ExudynModel, residual: Residual, point: Point) -> dict[str, float]:
+    """By how much each kind of condition is broken, rad or relative to the scene's size.
+
+    point : the iterate that the residual is of
+    """
     joints, size = model.joints, model.scene.size / model.length
     gaps = np.abs(residual.equations) / np.where(joints.is_length, size, 1.0)
     found = {
@@ -159,6 +163,10 @@ def gaps_of(model: ExudynModel, residual: Residual) -> dict[str, float]:
         for kind in Condition
         if (joints.conditions == kind).any()
     }
+    for kind, angle in joints.reversals(exp_so3(point.total[:, 3:])).items():
+        found[_NAMES[kind]] = angle
+    if turns := joints.whole_turns(point.angles):
+        found[_NAMES[Condition.ANGLE]] = turns
     return found if model.scene.actuated is None else {**found, "opening": abs(residual.gap)}
 
 

@@ -59,7 +59,7 @@ class _Joint:
 
     marker : of its first side; hinge : whose prescribed angle turns that side, or -1; body : whose
     axes in the scene are that side's, or -1; rows : its rotational equations among `_Equations`;
-    set : the frame that its first side has been given last
+    along : its axes among `_Along`; set : the frame that its first side has been given last
     """
 
     number: Any
@@ -71,6 +71,7 @@ class _Joint:
     hinge: int = -1
     body: int = -1
     rows: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    along: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
     set: np.ndarray | None = None
 
 
@@ -95,6 +96,21 @@ class _Equations:
     sign: np.ndarray
 
 
+@dataclass
+class _Along:
+    """Axes that joints hold together, (m,) each: of the first side, a, and of the second one, b.
+
+    kind : `Condition`; the rest as in `_Equations`
+    """
+
+    kind: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+    a: np.ndarray
+    b: np.ndarray
+    a_axis: np.ndarray
+
+
 class Joints:
     """All joints of a model: `index` them when the model is assembled, then `set` parameters.
 
@@ -116,6 +132,7 @@ class Joints:
         self._joints: list[_Joint] = []
         self._held: list[tuple[Any, int, int]] = []  # connector, body and axis of a place
         self._offsets: dict[Any, float] = {}
+        self._prescribed = scene.initial.angles
         self._add_ties()
         self._add_hinges(scene)
         self._add_pins(scene)
@@ -196,6 +213,7 @@ class Joints:
         system = self._mbs.systemData
         rotations: list[tuple] = []
         positions: list[tuple] = []
+        along: list[tuple] = []
         kinds, lengths = {}, set()
         for joint in self._joints:
             rows = system.GetObjectLTGAE(joint.number)
@@ -222,6 +240,19 @@ class Joints:
                     )
                 )
             joint.rows = np.arange(begin, len(rotations))
+            begin = len(along)
+            for k in _together(joint.axes[3:]):
+                along.append(
+                    (
+                        int(joint.condition),
+                        joint.first.node,
+                        joint.second.node,
+                        joint.first.frame[:, k],
+                        joint.second.frame[:, k],
+                        k,
+                    )
+                )
+            joint.along = np.arange(begin, len(along))
         for connector, _, _ in self._held:
             (row,) = system.GetObjectLTGAE(connector)
             kinds[row] = Condition.PIN
@@ -233,11 +264,13 @@ class Joints:
             *(_column(rotations, k, size) for k, size in enumerate((0, 0, 0, 3, 3, 0))),
             *(_column(positions, k, size) for k, size in enumerate((0, 0, 3, 0))),
         )
+        self._along = _Along(*(_column(along, k, n) for k, n in enumerate((0, 0, 0, 3, 3, 0))))
 
     def set(self, scene: Scene, q: np.ndarray, reference: np.ndarray) -> None:
         """Take a scene's prescribed angles, places and axes; reference (n_nodes, 6) coordinates."""
         state, equations = scene.with_driven(scene.initial, q), self._equations
         turns = scene.hinge_turns(state.angles)
+        self._prescribed = state.angles
         for joint in self._joints:
             if joint.hinge >= 0:
                 frame = joint.first.frame @ turns[joint.hinge]
@@ -251,12 +284,37 @@ class Joints:
             end = _End(joint.first.node, frame, joint.first.place)
             self._mbs.SetMarkerParameter(joint.marker, "localHT", end.pose)
             equations.a[joint.rows] = frame.T[equations.a_axis[joint.rows].astype(int)]
+            self._along.a[joint.along] = frame.T[self._along.a_axis[joint.along].astype(int)]
         for connector, body, axis in self._held:
             node = self._layout.carriers[body, -1].node
             offset = float(state.positions[body, axis] / self._unit - reference[node, axis])
             if offset != self._offsets.get(connector):
                 self._offsets[connector] = offset
                 self._mbs.SetObjectParameter(connector, "offset", offset)
+
+    def whole_turns(self, angles: np.ndarray) -> float:
+        """Full turns, as an angle, by which angles (n_hinges,) miss the prescribed ones at most:
+        frames don't tell them.
+        """
+        hinges = [joint.hinge for joint in self._joints if joint.hinge >= 0]
+        turns = np.rint((angles - self._prescribed)[hinges] / (2 * np.pi))
+        return float(2 * np.pi * np.abs(turns).max(initial=0.0))
+
+    def reversals(self, rotations: np.ndarray) -> dict[Condition, float]:
+        """Angles, where more than a quarter turn, between axes that joints hold together, the
+        largest of each kind; rotations (n_nodes, 3, 3).
+
+        Exudyn's equations ask for right angles between the other axes, which half a turn keeps.
+        """
+        along = self._along
+        R = np.concatenate([rotations, _I3[None]])  # the ground is the last one
+        ahead = np.einsum("mij,mj->mi", R[along.first], along.a)
+        cosine = np.einsum("mi,mij,mj->m", ahead, R[along.second], along.b)
+        found: dict[Condition, float] = {}
+        for k in np.flatnonzero(cosine < 0.0).tolist():
+            kind = Condition(int(along.kind[k]))
+            found[kind] = max(found.get(kind, 0.0), float(np.arccos(max(cosine[k], -1.0))))
+        return found
 
     def geometric_stiffness(
         self, rotations: np.ndarray, reactions: np.ndarray
@@ -307,6 +365,12 @@ def _products(axes: tuple[int, ...]) -> list[tuple[int, int, int]]:
     if len(free) == 2:
         return [(k, free[0], free[1]) for k in range(3) if axes[k]]
     return []
+
+
+def _together(axes: tuple[int, ...]) -> list[int]:
+    """The axes that both sides of a joint have in common: all, the only free one, or none."""
+    free = [k for k in range(3) if not axes[k]]
+    return [0, 1, 2] if not free else free if len(free) == 1 else []
 
 
 def _column(rows: list[tuple], k: int, size: int) -> np.ndarray:

@@ -104,7 +104,7 @@ class _Run:
         self.model: ExudynModel = model_of(system.scene)
         self.model.set(system.scene, q, opening)
         self.rods = _Rods(self.model, q)
-        self.point = self.model.point(self.scene.with_driven(start.state, q), start.torque)
+        self.point = self.model.point(self.scene.held(start.state, q), start.torque)
         n = len(self.scene.elements)
         self.stress = np.zeros((n, 6)) if start.stress is None else start.stress.copy()
         self.iterations = self.escapes = 0
@@ -231,7 +231,7 @@ class _Run:
         largest, force = balance_of(self.model, residual)
         self.relative, self.balance = largest / force, residual.balance
         allowed = max(self.options.tolerance * force, 0.2 * ROUND_OFF * self.model.round_off)
-        gap = max(gaps_of(self.model, residual).values(), default=0.0)
+        gap = max(gaps_of(self.model, residual, self.point).values(), default=0.0)
         return max(largest / allowed, gap / _MAX_GAP)
 
     # -- saddles -----------------------------------------------------------------------------------

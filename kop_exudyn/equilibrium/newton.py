@@ -87,8 +87,8 @@ def solve(
     system : the scene's workspace; afterwards it holds the assembled and factorised Hessian of the
         solution
     q : (n_parameters,) parameters
-    start : what to start from (default: the scene's initial state, unstressed); driven unknowns are
-        set from q
+    start : what to start from (default: the scene's initial state, unstressed); pinned unknowns are
+        set to where the scene pins them, driven ones from q
     opening : rad, mean angle of the actuated hinges (must be given exactly when the scene is
         actuated)
 
@@ -151,7 +151,7 @@ class _Run:
         options: NewtonOptions,
     ):
         self.system, self.q, self.opening, self.options = system, q, opening, options
-        self.state = system.scene.with_driven(start.state, q)
+        self.state = system.scene.held(start.state, q)
         self.torque = start.torque
         system.predicted_stress[:] = 0.0 if start.stress is None else start.stress
         self.iterations = 0

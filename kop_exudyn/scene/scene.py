@@ -24,6 +24,9 @@ from ..rods.sections import Section
 from .state import State
 from .terms import SceneTerm
 
+# by how much the cosine of a held turn may miss 1
+_ROUND_OFF = 1e-14
+
 
 @dataclass(frozen=True)
 class Driven:
@@ -65,7 +68,7 @@ class Scene:
     q[parameter]
     weight (E, 3) : dead load per rest length, or None
     driven : unknowns prescribed by parameters
-    pinned : (6 n_bodies + n_hinges,) bool, unknowns held at their initial value
+    pinned : (6 n_bodies + n_hinges,) bool, unknowns held at their initial value; see `held`
     actuated : hinges whose mean angle is prescribed ("opening"), or None
     terms : loads, attraction, actuators
     chains : rod pieces
@@ -196,6 +199,40 @@ class Scene:
         bodies = d.dofs[~hinge]
         positions[bodies // 6, bodies % 6] = values[~hinge]
         return State(positions, state.rotations, angles)
+
+    def held(self, state: State, q: np.ndarray) -> State:
+        """The state with the pinned unknowns where this scene pins them and the driven ones at
+        their values at q: what an iteration may start from.
+
+        Of a body that may turn about one of its axes only, that turn is kept. One that may turn
+        about two keeps its turns: increments about the third are held, no place of it.
+        """
+        state, n = self.with_driven(state, q), 6 * self.n_bodies
+        if not self.pinned.any():
+            return state
+        pinned, at = self.pinned[:n].reshape(-1, 2, 3), self.initial
+        rotations = state.rotations.copy()
+        fixed = pinned[:, 1].all(axis=1)
+        rotations[fixed] = at.rotations[fixed]
+        for body in np.flatnonzero(pinned[:, 1].sum(axis=1) == 2).tolist():
+            turn = at.rotations[body].T @ state.rotations[body]
+            k = int(np.argmin(pinned[body, 1]))
+            if abs(turn[k, k] - 1.0) > _ROUND_OFF:
+                i, j = (k + 1) % 3, (k + 2) % 3
+                angle = np.arctan2(turn[j, i] - turn[i, j], turn[i, i] + turn[j, j])
+                rotations[body] = at.rotations[body] @ exp_so3(angle * np.eye(3)[k])
+        return State(
+            np.where(pinned[:, 0], at.positions, state.positions),
+            rotations,
+            np.where(self.pinned[n:], at.angles, state.angles),
+        )
+
+    def held_at(self, state: State) -> Scene:
+        """The same scene with its pins where a state has them: supports that have been moved.
+
+        state : becomes the scene's initial one
+        """
+        return replace(self, initial=state)
 
     def hinge_turns(self, angles: np.ndarray) -> np.ndarray:
         """E(a) (n_hinges, 3, 3), turns about the hinges' axes."""

@@ -91,7 +91,7 @@ def best_alone(
     """Exudyn's static solver from a start (default: the scene's own), with the best of settings."""
     model = model_of(scene)
     model.set(scene, q, opening)
-    state = scene.with_driven(scene.initial if start is None else start, q)
+    state = scene.held(scene.initial if start is None else start, q)
     mean = None if scene.actuated is None else float(state.angles[scene.actuated].mean())
     best = None
     for name, (steps, stabiliser, modified) in tried.items():

@@ -133,7 +133,55 @@ def test_a_state_off_its_pins_is_refused(solved):
         confirm(scene, replace(eq, state=turned))
 
 
-@pytest.mark.parametrize("pinned", [(3, 4, 5), (0, 1, 2), (2,), (3, 4)])
+@pytest.mark.parametrize("turn", [(np.pi, 0, 0), (0, np.pi, 0), (0, 0, np.pi), (0, 2.2, 2.2)])
+def test_pins_turned_by_half_a_turn_are_refused(solved, turn):
+    """Exudyn's equations of a held turn hold there as well: they are of right angles."""
+    case, eq = solved
+    scene = case.scene.with_terms()
+    system = System(scene)
+    eq = refine(system, solve(system, case.q, eq, case.opening))
+    body = int(np.flatnonzero(scene.pinned[: 6 * scene.n_bodies])[0]) // 6
+    turned = eq.state.transformed(exp_so3(np.array(turn)), np.zeros(3))
+    turned = turned.transformed(np.eye(3), eq.state.positions[body] - turned.positions[body])
+    with pytest.raises(SimulationFailure, match="pin is off by [23]"):
+        confirm(scene, replace(eq, state=turned))
+
+
+@pytest.mark.parametrize("turns", [1, -1, 3])
+def test_prescribed_angles_count_full_turns(solved, turns):
+    case, eq = solved
+    scene = case.scene
+    hinge = int(scene.driven.dofs[scene.driven.dofs >= 6 * scene.n_bodies][0]) - 6 * scene.n_bodies
+    angles = eq.state.angles.copy()
+    angles[hinge] += 2 * np.pi * turns
+    with pytest.raises(SimulationFailure, match="prescribed angle is off by"):
+        confirm(scene, replace(eq, state=replace(eq.state, angles=angles)))
+
+
+@pytest.mark.parametrize("turn", [0.4, 3.0, np.pi, 4.5])
+def test_supports_that_have_been_moved_are_the_scenes(strut, turn):
+    """A rod whose end is held, wound on in steps about its axis, and led aside; its scene says
+    where."""
+    scene = strut()
+    held = scene.pinned.copy()
+    held[6 * 8 : 6 * 9] = True
+    scene = scene.with_pins(held)
+    state = scene.initial
+    for share in np.linspace(0.1, 1, 10):
+        positions, rotations = state.positions.copy(), state.rotations.copy()
+        positions[8] = scene.initial.positions[8] + share * np.array([-0.02, 0.1, 0.0])
+        rotations[8] = exp_so3(share * np.array([turn, 0.0, 0.0]))
+        moved = scene.held_at(State(positions, rotations, state.angles))
+        system = System(moved)
+        eq = refine(system, solve(system, np.zeros(0)))
+        state = eq.state
+        assert confirm(moved, eq).moved < 1e-8
+    assert np.allclose(state.rotations[8], moved.initial.rotations[8], rtol=0, atol=1e-15)
+    with pytest.raises(SimulationFailure, match="pin is off by"):
+        confirm(scene, eq)
+
+
+@pytest.mark.parametrize("pinned", [(3, 4, 5), (0, 1, 2), (2,), (3, 4), (2,), (3, 4)])
 def test_supports_at_another_place_are_refused(strut, pinned):
     """Of a cantilever whose end is held as well, in places, turns, or some of them."""
     scene = strut().with_terms(DeadForces([4], [0, 0.1, 0.5]))

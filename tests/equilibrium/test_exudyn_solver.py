@@ -11,6 +11,7 @@ from kop_exudyn.equilibrium.exudyn_confirm import confirm
 from kop_exudyn.equilibrium.newton import NewtonOptions, solve
 from kop_exudyn.equilibrium.system import System
 from kop_exudyn.errors import InputError, SimulationFailure
+from kop_exudyn.rods.rotations import exp_so3
 from kop_exudyn.scene.loads import DeadForces
 
 
@@ -80,3 +81,15 @@ def test_an_opening_belongs_to_actuated_scenes(strut, wheel):
 def test_unknown_engines_are_named():
     with pytest.raises(InputError, match=r"engine = 'exodyn': unknown engine .*fast, exudyn"):
         engine("exodyn")
+
+
+@pytest.mark.parametrize("name", ["fast", "exudyn"])
+def test_pins_are_where_the_scene_has_them(strut, name):
+    """Wherever a start has them: what is reached is the scene's, and confirmed as such."""
+    scene = strut().with_terms(DeadForces([8], [0, 0.1, 0.5]))
+    there = scene.initial.transformed(exp_so3(np.array([0.3, 0.2, -0.4])), np.array([0.1, 0, 0.2]))
+    found = engine(name)(System(scene), np.zeros(0), there)
+    own = solve(System(scene), np.zeros(0))
+    confirm(scene, found)
+    assert np.allclose(found.state.positions, own.state.positions, rtol=0, atol=1e-7)
+    assert np.array_equal(solve(System(scene), np.zeros(0), there).state.rotations[0], np.eye(3))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kop_exudyn.errors import InputError, SimulationFailure
-from kop_exudyn.rods.rotations import rotation_z
+from kop_exudyn.rods.rotations import exp_so3, log_so3, rotation_z
 from kop_exudyn.rods.sections import rectangle
 from kop_exudyn.scene.builder import SceneBuilder
 
@@ -89,6 +89,36 @@ def test_prescriptions_follow_the_parameters():
     assert state.positions[3].tolist() == [9.0, 20.5, 11.0]
     assert state.angles[0] == pytest.approx(0.4)
     assert scene.initial.angles[0] == 0.3
+
+
+@pytest.mark.parametrize("free", [(), (0,), (1,), (2,), (0, 1, 2)])
+def test_states_brought_to_the_pins(free):
+    """Held places, turns and angles are the scene's, what is free stays as it is."""
+    builder = two_rods()
+    builder.hinges([0.2], prescribed=True)
+    builder.pin(3, (1, *(3 + k for k in range(3) if k not in free)))
+    scene = builder.build()
+    q = np.array([0.0, 10.0, 0.1])
+    there = scene.initial.moved(np.random.default_rng(1).normal(size=scene.n_dofs))
+    state = scene.held(there, q)
+    assert np.array_equal(state.positions[0], scene.initial.positions[0])
+    assert state.positions[3, 1] == scene.initial.positions[3, 1]
+    assert np.array_equal(state.positions[3, ::2], there.positions[3, ::2])
+    assert state.angles.tolist() == pytest.approx([0.4, 0.2])
+    turn = log_so3(scene.initial.rotations[3].T @ state.rotations[3])
+    assert np.abs(np.delete(turn, free)).max(initial=0.0) < 1e-14
+    if len(free) != 1:
+        assert np.array_equal(
+            there.rotations[3] if free else scene.initial.rotations[3], state.rotations[3]
+        )
+    else:  # the nearest of the turns that are left
+        near = [
+            np.trace(there.rotations[3].T @ scene.initial.rotations[3] @ exp_so3(a * turn))
+            for a in (0.99, 1.0, 1.01)
+        ]
+        assert np.argmax(near) == 1
+    again = scene.held(state, q)
+    assert np.array_equal(again.rotations, state.rotations)
 
 
 def test_pins_hold_bodies_and_constant_hinges():
