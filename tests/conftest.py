@@ -136,13 +136,6 @@ def parts(shells, clustering):
 # an entry goes when its fault does.
 KNOWN_FAULTS = {
     "test_opening_path_closes_step_by_step": "small C-shells are assembled flat now",
-    "test_exudyn_deploys_a_design_of_every_class[small/01_sinh]": (
-        "Exudyn alone opens this design into another state than the fast solver, since C-shells "
-        "open from their flat assembly"
-    ),
-    "test_export_writes_a_labelled_drawing_of_every_design": "files have new names",
-    "test_sheets_holes_and_single_folders": "sheets have other margins since the book",
-    "test_exported_vtu_has_strains_stresses_and_utilisation": "meshio writes compressed VTU files",
     "test_commands_print_what_the_page_shows": "the page's figures wait for another run",
     "test_quick_failure_and_rescue": "nothing snaps in the quick cases with the present models",
     "test_starting_from_a_larger_kit_is_better_than_from_scratch": (

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import re
 from xml.etree import ElementTree
 
+import meshio
 import numpy as np
 import pytest
+from pypdf import PdfReader
 
 from kop_exudyn.cli import main
 from kop_exudyn.io.datasets import load_designs
@@ -98,17 +102,24 @@ def test_unusable_requests_of_view(run, tmp_path, capsys):
     assert not page.exists()
 
 
-def test_export_writes_a_labelled_drawing_of_every_design(run, tmp_path, capsys):
-    assert (
-        main(["export", *map(str, run), "--unit", "m", "--out", str(tmp_path / "files"), "--json"])
-        == 0
-    )
-    written = json.loads(capsys.readouterr().out)["files"]
-    workshop = tmp_path / "files" / "workshop"
-    assert set(written) == {str(path) for path in (tmp_path / "files").rglob("*.*")}
+@pytest.fixture(scope="module")
+def exported(run, tmp_path_factory):
+    """The folder of everything that is exported of the run, and what the command printed."""
+    folder = tmp_path_factory.mktemp("export") / "files"
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        assert main(["export", *map(str, run), "--unit", "m", "--out", str(folder), "--json"]) == 0
+    return folder, json.loads(printed.getvalue())["files"]
+
+
+def test_export_writes_a_labelled_drawing_of_every_design(run, exported):
+    folder, written = exported
+    workshop = folder / "workshop"
+    assert set(written) == {str(path) for path in folder.rglob("*.*")}
     result = load_run(run[0], load_designs(run[1]))
+    book = [page.extract_text() for page in PdfReader(workshop / "workshop.pdf").pages]
     for design in result.designs:
-        for suffix in ("csv", "svg", "pdf"):
+        for suffix in ("csv", "svg"):
             assert (workshop / f"assembly_{design.name}.{suffix}").stat().st_size > 1000
         root = ElementTree.parse(workshop / f"assembly_{design.name}.svg").getroot()
         groups = [
@@ -117,16 +128,21 @@ def test_export_writes_a_labelled_drawing_of_every_design(run, tmp_path, capsys)
             if g.get("id", "").startswith("text_")
         ]
         assert len(groups) >= design.n_elements + len(design.joints)
-    assert not list(workshop.glob("*unused*"))
-    before = {path: path.read_bytes() for path in workshop.iterdir()}
-    assert main(["export", *map(str, run), "--unit", "m", "--out", str(tmp_path / "files")]) == 2
-    assert {path: path.read_bytes() for path in workshop.iterdir()} == before
+        assert any(design.name in page for page in book)
+    assert not list(workshop.glob("*unused*")) and not any("unused" in page for page in book)
+
+
+def test_export_overwrites_nothing(run, exported):
+    folder, _ = exported
+    before = {path: path.read_bytes() for path in folder.rglob("*.*")}
+    assert main(["export", *map(str, run), "--unit", "m", "--out", str(folder)]) == 2
+    assert {path: path.read_bytes() for path in folder.rglob("*.*")} == before
 
 
 def test_sheets_holes_and_single_folders(run, tmp_path, capsys):
     command = ["export", *map(str, run), "--unit", "m", "--out", str(tmp_path)]
     assert main([*command, "--sheet", "200,100"]) == 2
-    assert "larger than a sheet's 170 x 56 mm" in capsys.readouterr().err and not list(
+    assert "larger than a sheet's 170 x 46 mm" in capsys.readouterr().err and not list(
         tmp_path.iterdir()
     )
     assert main([*command, "--sheet", "0,100"]) == 2
@@ -138,12 +154,9 @@ def test_sheets_holes_and_single_folders(run, tmp_path, capsys):
     assert (tmp_path / "desk" / "steps.csv").is_file()
 
 
-def test_exported_vtu_has_strains_stresses_and_utilisation(run, tmp_path):
-    assert main(["export", *map(str, run), "--unit", "m", "--out", str(tmp_path / "files")]) == 0
-    tree = ElementTree.parse(tmp_path / "files" / "desk" / "flat_assigned_deployed.vtu")
-    cells = {
-        array.get("Name"): np.array(array.text.split(), float) for array in tree.find(".//CellData")
-    }
+def test_exported_vtu_has_strains_stresses_and_utilisation(run, exported):
+    mesh = meshio.read(exported[0] / "desk" / "flat_assigned_deployed.vtu")
+    cells = {name: blocks[0] for name, blocks in mesh.cell_data.items()}
     assert {"stretch", "twist", "curvature_y", "My", "equivalent_stress", "utilisation"} <= set(
         cells
     )

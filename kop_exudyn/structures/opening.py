@@ -74,9 +74,11 @@ class Way:
         """The states at all stations and the deployed one, each solved from the one before, by
         the fast solver or another engine's `solve`.
 
-        Mean angles grow in half the steps from station to station. Iterations of a state count
-        those of the half-step before it. Raises SimulationFailure, naming the station, where none
-        is found.
+        Mean angles grow in half the steps from station to station. Where a saddle is left on such a
+        step, it was too long to tell which way the design goes there, and is taken in two parts,
+        then in four: engines that iterate differently follow the same way. Iterations of a state
+        count those of all states since the one before. Raises SimulationFailure, naming the
+        station, where none is found.
         """
         found: list[Equilibrium] = []
         before: Start | Equilibrium = assembled
@@ -90,7 +92,7 @@ class Way:
             passed: list[Equilibrium] = []
             try:
                 for to in steps:
-                    passed.append(solve(system, q, before, to))
+                    passed += _stepped(system, q, before, opening, to, solve)
                     before, opening = passed[-1], to
             except SimulationFailure as failure:
                 raise failure.within(station.name) from None
@@ -157,6 +159,30 @@ class Way:
         x, y = x - x.mean(axis=0), y - y.mean(axis=0)
         turn, _ = Rotation.align_vectors(y, x)
         return float(np.linalg.norm(turn.apply(x) - y, axis=1).max()) / self.diagonal
+
+
+def _stepped(
+    system: System,
+    q: np.ndarray,
+    before: Start | Equilibrium,
+    opening: float | None,
+    to: float | None,
+    solve: Callable[..., Equilibrium],
+) -> list[Equilibrium]:
+    """The states between a start of some opening and the one at another, that one included: none
+    between them unless a saddle was left."""
+    if opening is None or to is None:
+        return [solve(system, q, before, to)]
+    for parts in _PARTS:
+        found: list[Equilibrium] = []
+        for k in range(1, parts + 1):
+            at = to if k == parts else opening + (to - opening) * k / parts
+            found.append(solve(system, q, found[-1] if found else before, at))
+            if found[-1].escapes and parts < _PARTS[-1]:
+                break
+        else:
+            break
+    return found
 
 
 def _near(system: System, q: np.ndarray, near: Equilibrium, station: Station) -> Equilibrium:

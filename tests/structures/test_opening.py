@@ -39,6 +39,32 @@ def test_a_shell_opens_into_its_target(shell, states):
     assert np.abs(joints - shell.target.positions).max() < 0.05 * shell.target.diagonal
 
 
+def test_steps_that_leave_a_saddle_are_taken_in_parts(shell, states):
+    """An engine that jumps off where a step is long follows the same way by shorter ones; one that
+    leaves a saddle whatever the step does so in the shortest, and what it finds is kept."""
+    longest, taken = 0.06, []
+
+    def jumpy(always):
+        def solving(system, q, before, to):
+            found = solve(system, q, before, to)
+            step = to - getattr(before, "opening", to)
+            taken.append(step)
+            return replace(found, escapes=1) if always or abs(step) > longest else found
+
+        return solving
+
+    q = shell.parameters
+    rest = solve(shell.systems["rest"], q, None, shell.roles[1].opening)
+    start = shell.assembled(q, {"rest": rest})
+    found = shell.way.opened(shell.systems, q, start, jumpy(always=False))
+    assert len(found) == len(states)
+    assert max(map(shell.way.apart, found, states)) < 1e-6
+    assert max(map(abs, taken)) > longest and found[-1].escapes == 0
+    found = shell.way.opened(shell.systems, q, start, jumpy(always=True))
+    assert shell.way.apart(found[-1], states[-1]) < 1e-6
+    assert found[-1].escapes == 2 * 4  # both half-steps, in their shortest parts
+
+
 def test_it_rises_to_the_side_that_is_asked_for(repository, shell, states):
     """Both sides are equivalent, and only the push of the builder tells them apart."""
     other = load_design(repository / "models" / "small" / "01_sinh.json")
