@@ -13,12 +13,12 @@ from ..errors import SimulationFailure
 from ..scene.scene import Scene
 from ..search.objective import DesignObjective, Evaluation
 from ..search.stage_results import SAME_STATE
+from ..search.tolerance import Tolerance, sample_spread
 from ..structures.base import Design
 from ..structures.strength import design_strength, materials_of, rod_strength
 from ..structures.thickness import board_of, keeping_limit
 from ..units import in_millimetres
 from .load_check import LoadCheck, carrying_thickness
-from .tolerance import Tolerance, sample_spread
 
 _ROUNDING = 1e-6  # of the limit: a search that keeps to it may end on it
 _HALVINGS = 3  # of the tolerance, until nothing snaps

@@ -119,7 +119,8 @@ def deviation(result: KitResult) -> float:
 
 def unmet(result: KitResult, required: Requirements) -> list[str]:
     """In words, by which designs a kit misses what is required of it: that they open by themselves
-    into the states found, and that these keep below the elastic limit.
+    into the states found, that these keep below the elastic limit, and that errors of the workshop
+    don't make them snap.
 
     A design that is stressed beyond it as given can't be helped by a kit, and is left out.
     """
@@ -128,6 +129,8 @@ def unmet(result: KitResult, required: Requirements) -> list[str]:
         opened = result.redeployment(n) if result.redeployed else {"same_state": True}
         if required.opening and not opened.get("same_state", False):
             found.append(f"{design.name} opens into another state")
+        if required.samples and n in result.stages["assigned"].snapping:
+            found.append(f"{design.name} snaps with errors of the workshop")
         if not required.stress:
             continue
         given = _utilisation(strength_summary(design, result.references[n].equilibria))

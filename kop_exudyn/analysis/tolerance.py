@@ -15,48 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from ..equilibrium.sensitivities import Sensitivities
-from ..errors import InputError, SimulationFailure
-from ..kit.kinds import part_kind
-from ..search.objective import DesignObjective, Evaluation
-from ..search.stage_results import SAME_STATE
+from ..errors import SimulationFailure
+from ..search.objective import Evaluation
+from ..search.tolerance import Sample, Tolerance, joint_jacobian, sample_spread
 from ..structures.base import Design
-from ..structures.fitting import best_placement
-from .buckling import snapped
-
-_USUAL_SHARE, _LEAST_LENGTH = 1e-3, 2e-4  # of the median length; m
-_USUAL_ANGLE = np.radians(0.1)
-_STEPS_BACK = 3  # to the planned elements, which are near
-CONFIRMED = 0.1  # share of the samples that Exudyn confirms
-
-
-@dataclass(frozen=True)
-class Tolerance:
-    """Standard deviations of fabrication errors, independent from element to element.
-
-    length : in the design's unit
-    angle : rad
-    """
-
-    length: float
-    angle: float
-
-    def __post_init__(self) -> None:
-        for name in ("length", "angle"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
-                raise InputError(
-                    "must be a number that is not negative", field=name, value=getattr(self, name)
-                )
-
-    def scaled(self, factor: float) -> Tolerance:
-        return Tolerance(factor * self.length, factor * self.angle)
-
-    def deviations(self, design: Design) -> np.ndarray:
-        """(nq,) standard deviation of every parameter; 0 for those that belong to no element."""
-        found = np.zeros(len(design.parameters))
-        for group in design.groups:
-            found[group.indices] = self.angle if part_kind(group.kind).angular else self.length
-        return found
 
 
 @dataclass(frozen=True)
@@ -81,34 +43,6 @@ class Spread:
         return 100 * float(self.joints.max()) / self.diagonal
 
 
-@dataclass(frozen=True)
-class Sample:
-    """One set of errors, and what came of it: the joints' displacements (n, 3), or why no
-    equilibrium was found.
-
-    snapped : into another state, from which the design doesn't come back when the errors are taken
-        away
-    confirmed : by Exudyn, which only some samples are given to
-    """
-
-    errors: np.ndarray
-    displacements: np.ndarray | None
-    max_percent: float | None
-    failed: str | None = None
-    snapped: bool = False
-    confirmed: bool = False
-
-
-def joint_jacobian(design: Design, evaluation: Evaluation) -> np.ndarray:
-    """(3n, nq) derivative of the fitted state's joints in the parameters, rigid motions taken
-    out."""
-    role = design.fitted_role.name
-    equilibrium = evaluation.equilibria[role]
-    J = Sensitivities(design.systems[role], equilibrium).positions(design.joints)
-    motions = _rigid_motions(equilibrium.state.positions[design.joints])
-    return J - motions @ (motions.T @ J)
-
-
 def predicted_spread(design: Design, evaluation: Evaluation, tolerance: Tolerance) -> Spread:
     """The joints' displacements to first order: no equilibrium is solved."""
     rows = joint_jacobian(design, evaluation) * tolerance.deviations(design)
@@ -131,61 +65,6 @@ def shares_by_kind(
     return found
 
 
-def sample_spread(
-    design: Design,
-    evaluation: Evaluation,
-    tolerance: Tolerance,
-    number: int,
-    seed: int = 0,
-    confirmed: float = CONFIRMED,
-    objective: DesignObjective | None = None,
-) -> list[Sample]:
-    """Re-solved equilibria for `number` sets of normally distributed errors; the same errors for
-    the same seed.
-
-    confirmed : share of the samples that Exudyn has to confirm, evenly spread, the first one among
-        them
-    objective : the design's, where there is one already
-
-    A set for which no equilibrium is found, or whose equilibrium Exudyn doesn't confirm, is a
-    sample with its reason. What ends where its sensitivities say has not snapped; anything else has
-    to come back when the errors are undone.
-    """
-    generator, deviations = np.random.default_rng(seed), tolerance.deviations(design)
-    role = design.fitted_role.name
-    objective = DesignObjective(design) if objective is None else objective
-    J = joint_jacobian(design, evaluation)
-    wanted = evaluation.equilibria[role].state.positions[design.joints]
-    samples = []
-    for k in range(number):
-        errors = deviations * generator.standard_normal(len(deviations))
-        try:
-            found = objective.evaluate(evaluation.q + errors, evaluation)
-            asked = int(np.ceil((k + 1) * confirmed)) > int(np.ceil(k * confirmed))
-            if asked:
-                found = objective.confirm(found)
-        except SimulationFailure as failure:
-            samples.append(Sample(errors, None, None, str(failure)))
-            continue
-        joints = found.equilibria[role].state.positions[design.joints]
-        moved = (
-            best_placement(joints, wanted, np.full(len(joints), 1 / len(joints))).apply(joints)
-            - wanted
-        )
-        missed = np.linalg.norm(moved - (J @ errors).reshape(-1, 3), axis=1).max()
-        away = missed > SAME_STATE * evaluation.fit.diagonal
-        samples.append(
-            Sample(
-                errors,
-                moved,
-                found.fit.max_percent,
-                snapped=bool(away and snapped(objective, found, evaluation, _STEPS_BACK)),
-                confirmed=asked,
-            )
-        )
-    return samples
-
-
 def sampled_spread(samples: Sequence[Sample], diagonal: float) -> Spread:
     """Root mean square displacements over the samples that were found. Raises SimulationFailure
     when none was."""
@@ -202,37 +81,6 @@ def predicted_displacements(
     in both."""
     J = joint_jacobian(design, evaluation)
     return np.stack([(J @ sample.errors).reshape(-1, 3) for sample in samples])
-
-
-def _rigid_motions(x: np.ndarray) -> np.ndarray:
-    """(3n, r) orthonormal basis of the infinitesimal rigid motions of points (n, 3); collinear
-    points have fewer."""
-    arms = x - x.mean(axis=0)
-    size = np.abs(arms).max() or 1.0
-    columns = [np.tile(axis, (len(x), 1)) for axis in np.eye(3)] + [
-        np.cross(axis, arms / size) for axis in np.eye(3)
-    ]
-    u, s, _ = np.linalg.svd(np.stack([c.ravel() for c in columns], axis=1), full_matrices=False)
-    return u[:, s > 1e-9 * s[0]]
-
-
-def relative_tolerance(design: Design, share: float, angle: float) -> Tolerance:
-    """Lengths uncertain by a share of the design's median length, angles by so many rad."""
-    lengths = [
-        design.parameters[group.indices].ravel()
-        for group in design.groups
-        if not part_kind(group.kind).angular
-    ]
-    return Tolerance(share * float(np.median(np.concatenate(lengths))) if lengths else 0.0, angle)
-
-
-def usual_tolerance(design: Design) -> Tolerance:
-    """What careful work keeps to: lengths within 0.1 % of the median, but not below 0.2 mm where
-    the design names its units, and angles within 0.1 degrees."""
-    found = relative_tolerance(design, _USUAL_SHARE, _USUAL_ANGLE)
-    if design.units is None:
-        return found
-    return Tolerance(max(found.length, _LEAST_LENGTH / design.units.metres), found.angle)
 
 
 def robustness(

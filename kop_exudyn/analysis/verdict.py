@@ -18,10 +18,11 @@ from ..errors import InputError, SimulationFailure
 from ..scene.scene import Scene
 from ..search.objective import DesignObjective, Evaluation
 from ..search.stage_results import SAME_STATE, distance
+from ..search.tolerance import Tolerance, sample_spread, usual_tolerance
 from ..structures.base import Design
 from .load_check import LoadCheck, check_load
 from .mending import Stop, about_loads, about_opening, about_stress, about_tolerance
-from .tolerance import Tolerance, predicted_spread, sample_spread, usual_tolerance
+from .tolerance import predicted_spread
 
 OPENED = "opened"  # the state that the assembly opens into, where it is another one
 _MAY_SNAP = 0.01  # of the samples

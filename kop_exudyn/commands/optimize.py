@@ -159,9 +159,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--without",
-        choices=("opening", "stress", "both"),
+        choices=("opening", "stress", "tolerance", "all"),
         help="don't require that designs open by themselves, that stress keeps below the elastic "
-        "limit, or either: to see what that costs",
+        "limit, that errors of the workshop make nothing snap, or anything: to see what that costs",
     )
     parser.add_argument(
         "--samples",
@@ -294,7 +294,11 @@ def _smallest(args: argparse.Namespace, study: Study, parts: dict[str, int]) -> 
     Weights.of(args.weights or {})
     study = replace(
         study,
-        settings=replace(study.settings, **_given(args)),
+        settings=replace(
+            study.settings,
+            requirements=_required(args, study.settings.requirements),
+            **_given(args),
+        ),
         weights={**study.weights, **(args.weights or {})},
         baselines=False,
     )
@@ -356,8 +360,13 @@ def _required(args: argparse.Namespace, known: Requirements) -> Requirements:
     """A study's requirements with what options say of them."""
     from dataclasses import replace
 
-    left_out = ("opening", "stress") if args.without == "both" else (args.without,)
-    changes: dict[str, Any] = {name: False for name in left_out if name is not None}
+    changes: dict[str, Any] = {}
+    if args.without in ("opening", "all"):
+        changes["opening"] = False
+    if args.without in ("stress", "all"):
+        changes["stress"] = False
+    if args.without in ("tolerance", "all"):
+        changes["samples"] = 0
     if args.safety is not None:
         changes["safety"] = args.safety
     return replace(known, **changes)

@@ -109,7 +109,8 @@ def _from_file(path: Path) -> Study:
         raise error.at(path) from None
     counts = _files(data["designs"], path)
     settings = dict(data.get("settings", {}))
-    settings["requirements"] = Requirements(**data.get("requirements", {}))
+    errors = {k: v for k, v in data.get("tolerance", {}).items() if k in ("length", "angle")}
+    settings["requirements"] = Requirements(**errors, **data.get("requirements", {}))
     if "schedule" in settings:
         settings["schedule"] = tuple(settings["schedule"])
     if "bounds" in settings:

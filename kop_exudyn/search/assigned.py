@@ -36,6 +36,9 @@ _AFTER_LEAP = 2  # rounds at most
 # of J: another reassignment comes before the SQP while they lower it by this factor
 _WORTHWHILE = 0.97
 
+# times the weights of stress and energy, where a design snaps
+_CALMER = (3.0, 10.0, 30.0)
+
 # what came of a reassignment, and the damping of its model
 _Trial = tuple[StageResult, Reassignment, float]
 
@@ -77,48 +80,108 @@ def assigned_stage(
     return replace(rounds.polished(best), steps=rounds.steps, jumps=start.jumps)
 
 
-def opened_stage(stages: Stages, start: StageResult) -> StageResult:
-    """Designs that open into their shape by themselves: rounds from where they open into, again and
-    again.
+def opened_stage(
+    stages: Stages, start: StageResult, before: StageResult | None = None
+) -> StageResult:
+    """Designs that open into their shape by themselves, and keep to it whatever errors of the
+    workshop do: rounds from where they open into, again and again.
 
     The states of the assigned stage are led to from the relaxed ones, by ways that no builder goes:
     the search is freer so. Opened from its assembly, a design may end in another stable state; with
     rounds from there (but no leaps, which end in other states more often), the optimisation works
     on the states that a builder will find. Where they still aren't the same in the end, the best of
-    these states are kept, and the parts optimised once more in secured steps.
+    these states are kept, and the parts optimised once more in secured steps. Then follows
+    `forgiving_stage`.
+
+    before : where the assigned stage began
 
     The result's states are those that the designs open into, unless one doesn't open at all.
     """
     settings = stages.settings
-    if not stages.required.opening:
-        return start
-    best: StageResult | None = None
     result, numbers = start, count(_rounds_at_most(settings))
+    if not stages.required.opening:
+        return forgiving_stage(stages, start, (), numbers, before)
+    found: list[StageResult] = []
     for number in range(settings.redeployments + 1):
         opened = stages.judged(replace(result, designs=stages.redeployed(result)))
         log.info("opened from the assembly: J = %.5g, from %.5g", _value(opened), _value(result))
         same = opened.value is not None and _all_same(stages, result, opened)
-        if opened.value is not None and (best is None or _value(opened) < _value(best)):
-            best = result if same else opened
+        if opened.value is not None:
+            found.append(result if same else opened)
         if number == settings.redeployments or opened.value is None or same:
             break
         result = assigned_stage(stages, stages.confirmed(opened), numbers, leaps=0)
-    if best is None:
+    if not found:
         return start
+    best = min(found, key=_value)
+    others = [other for other in found if other is not best]
     if best is not result:
-        best = _secured(stages.secured(), best, numbers)
-    return replace(best, jumps=start.jumps)
+        best = _secured(stages, best, numbers)
+    return replace(forgiving_stage(stages, best, others, numbers, before), jumps=start.jumps)
+
+
+def forgiving_stage(
+    stages: Stages,
+    best: StageResult,
+    others: Sequence[StageResult],
+    numbers: Iterator[int],
+    before: StageResult | None = None,
+) -> StageResult:
+    """A result whose designs keep to their shape whatever errors of the workshop do; `best` where
+    they do, or where nothing else is found.
+
+    others : results that were found on the way to the best one
+    numbers : of the SQPs that follow
+    before : where the assigned stage began, which is gone back to where nothing else helps
+
+    A design that snaps is a point that should not have been accepted. The first of the others that
+    forgives is the next best point. The parts are also optimised with more weight on stress and
+    energy, and from there again with the weights asked for, in steps that keep to what was won.
+    """
+    lost = stages.snapping(best)
+    if not lost:
+        return best
+    names = [stages.dataset.designs[n].name for n in lost]
+    log.info("errors of the workshop make %s snap", ", ".join(names))
+    found: list[StageResult] = []
+    for other in sorted(others, key=_value):
+        if not stages.snapping(other):
+            found.append(_secured(stages, other, numbers))
+            break
+    steps = best.steps
+    for factor in _CALMER if stages.rule.parts_move else ():
+        calmer = stages.calmer(factor)
+        trial = calmer.assigned(calmer.weighed(best), f"assigned-{next(numbers)}")
+        steps += trial.steps
+        if stages.required.opening:
+            opened = stages.judged(replace(trial, designs=stages.redeployed(trial)))
+        else:
+            opened = stages.weighed(trial)
+        if opened.value is not None and not stages.snapping(opened):
+            found.append(_secured(stages, opened, numbers))
+            break
+    if not found and before is not None:
+        first = stages.secured().kept(before)
+        if first.value is not None and not stages.snapping(first):
+            found.append(_secured(stages, first, numbers))
+    if not found:
+        return replace(best, steps=steps, snapping=lost)
+    won = min(found, key=_value)
+    log.info("they keep to their shapes at J = %.5g, from %.5g", _value(won), _value(best))
+    return replace(won, steps=max(steps, won.steps))
 
 
 def _secured(stages: Stages, best: StageResult, numbers: Iterator[int]) -> StageResult:
     """Designs in the states that they open into, with the parts optimised once more in steps that
-    keep every design on the branch along which it opens; as they were where that gains nothing."""
-    best = stages.kept(best)
+    keep every design on the branch along which it opens, and forgiving where it is that; as they
+    were where that gains nothing."""
+    secured = stages.secured(forgiving=not stages.snapping(best))
+    best = secured.kept(best)
     if not stages.rule.parts_move or best.value is None:
         return best
-    found = stages.assigned(best, f"assigned-{next(numbers)}")
-    opened = replace(found, designs=stages.redeployed(found))
-    same = found.value is not None and _all_same(stages, found, opened)
+    found = secured.assigned(best, f"assigned-{next(numbers)}")
+    opened = replace(found, designs=secured.redeployed(found))
+    same = found.value is not None and _all_same(secured, found, opened)
     return replace(found, steps=best.steps + found.steps) if same else best
 
 

@@ -20,6 +20,7 @@ from ..structures.base import Design
 from .objective import DesignDerivatives, DesignObjective, Evaluation, Reference, Weights
 from .pool import DesignPool
 from .requirements import Requirements
+from .tolerance import forgives
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -235,7 +236,8 @@ class Dataset:
         self, evaluations: Sequence[Evaluation], previous: Sequence[Evaluation]
     ) -> list[Evaluation]:
         """The evaluations with the states on the way from the assembly, see
-        `DesignObjective.completed`. Raises the first SimulationFailure."""
+        `DesignObjective.completed`. Raises the first SimulationFailure, and one where sets of
+        errors are required that make a design snap."""
         calls = {
             n: (now, before)
             for n, (now, before) in enumerate(zip(evaluations, previous))
@@ -247,7 +249,26 @@ class Dataset:
             if isinstance(result, Evaluation):
                 self.tally.equilibria += len(result.way)
                 self.tally.newton_iterations += sum(state.iterations for state in result.way)
-        return all_or_raise(results)
+        found = all_or_raise(results)
+        if self.requirements.samples:
+            changed = {
+                n: now
+                for n, (now, before) in enumerate(zip(found, previous))
+                if not np.array_equal(now.q, before.q)
+            }
+            for n in self.snapping(changed):
+                raise SimulationFailure(
+                    "errors of the workshop make it snap", where=self.designs[n].name
+                )
+        return found
+
+    def snapping(self, evaluations: Mapping[int, Evaluation]) -> list[int]:
+        """The designs among these that errors of the workshop make snap, as far as the requirements
+        ask for that, see `forgives`."""
+        if not self.requirements.samples:
+            return []
+        told = self._map(forgives, {n: (e,) for n, e in evaluations.items()})
+        return [n for n, forgiving in told.items() if forgiving is not True]
 
     def judge(
         self,

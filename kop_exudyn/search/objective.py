@@ -213,7 +213,7 @@ class DesignObjective:
         try:
             if self._way is None:
                 found = self.judge(q, design.deploy(q))
-                same = self._apart(found, evaluation) <= SAME_STATE
+                same = self.apart(found, evaluation) <= SAME_STATE
                 return evaluation if same else found
             *way, deployed = self._way.opened(
                 design.systems, q, design.assembled(q, evaluation.equilibria)
@@ -258,8 +258,9 @@ class DesignObjective:
             solves=evaluation.solves + len(way),
         )
 
-    def _apart(self, a: Evaluation, b: Evaluation) -> float:
-        """The largest distance of a joint in two states, as a share of the size."""
+    def apart(self, a: Evaluation, b: Evaluation) -> float:
+        """The largest distance of a joint in two states, each at its best placement on the target,
+        as a share of the size."""
         role = self.design.fitted_role.name
         x, y = (
             e.fit.placement.apply(e.equilibria[role].state.positions[self.design.joints])

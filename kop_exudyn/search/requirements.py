@@ -17,6 +17,11 @@ class Requirements:
         leads to along the way of `Design.stations`, without a snap
     stress : the equivalent stress stays below the elastic limit in all states that a builder sees
     safety : factor by which the elastic limit is divided
+    samples : sets of errors of the workshop that every result of the search is tried with: one that
+        makes a design snap into another shape counts like a design that does not open. 0: none
+    length, angle : standard deviations of these errors, in the designs' unit and rad; None: the
+        usual ones, see `usual_tolerance`
+    margin : factor by which the errors are larger than that, so that few sets tell what many would
     penalty : weight of a bound's excess (utilisation beyond 1), as a share of the fit's weight:
         at first 1 % of excess counts as much as a deviation of 1 % of the size at every joint
 
@@ -26,13 +31,25 @@ class Requirements:
     opening: bool = True
     stress: bool = True
     safety: float = 1.0
+    samples: int = 10
+    length: float | None = None
+    angle: float | None = None
+    margin: float = 1.5
     penalty: float = 0.01
 
     def __post_init__(self) -> None:
         for name in ("opening", "stress"):
             if not isinstance(getattr(self, name), bool):
                 raise InputError("must be true or false", field=name, value=getattr(self, name))
-        for name in ("safety", "penalty"):
+        if not isinstance(self.samples, int) or isinstance(self.samples, bool) or self.samples < 0:
+            raise InputError(
+                "must be a whole number, not negative", field="samples", value=self.samples
+            )
+        for name in ("length", "angle"):
+            value = getattr(self, name)
+            if value is not None and not (np.isfinite(value) and value >= 0):
+                raise InputError("must not be negative", field=name, value=value)
+        for name in ("safety", "margin", "penalty"):
             value = getattr(self, name)
             number = isinstance(value, (int, float)) and not isinstance(value, bool)
             if not (number and np.isfinite(value) and value > 0):
@@ -41,4 +58,4 @@ class Requirements:
     @classmethod
     def none(cls) -> Requirements:
         """Nothing is required: the baselines are made so."""
-        return cls(opening=False, stress=False)
+        return cls(opening=False, stress=False, samples=0)

@@ -121,7 +121,7 @@ def optimize_kit(
             bases = [stages.inputs(), found["relaxed"].evaluations]
         found["assigned"], result.tried = assigned_from_starts(stages, result.at_parts, bases)
         announce("deployment of the assigned designs")
-        found["assigned"] = opened_stage(stages, found["assigned"])
+        found["assigned"] = opened_stage(stages, found["assigned"], result.at_parts)
         result.seconds["search"] = perf_counter() - begin_search
         result.redeployed = stages.redeployed(found["assigned"])
         if "direct" in found:

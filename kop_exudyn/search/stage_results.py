@@ -68,6 +68,8 @@ class StageResult:
     penalty : what the excess of the bounds costs, zero where all are met
     pressure : by design and state, the multiplier of its bound where that pushes: by how much J
         would fall for each unit that the bound were wider
+    snapping : the designs that errors of the workshop make snap, where nothing was found that keeps
+        all of them from it
     """
 
     designs: list[Evaluation | SimulationFailure]
@@ -79,6 +81,7 @@ class StageResult:
     jumps: list[Jump] = field(default_factory=list)
     penalty: float = 0.0
     pressure: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    snapping: tuple[int, ...] = ()
 
     @property
     def merit(self) -> float:

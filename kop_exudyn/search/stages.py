@@ -24,7 +24,7 @@ from ..sqp.problem import Point
 from ..sqp.solver import SQPOptions, SQPResult, minimise
 from .dataset import Dataset, all_or_raise, evaluations_from_arrays, evaluations_to_arrays
 from .kit_rule import rule_of
-from .objective import Evaluation
+from .objective import Evaluation, Weights
 from .problems import AssignedProblem, RelaxedProblem
 from .settings import StageSettings
 from .stage_results import Jump, StageEvent, StageResult, find_jump, restrict
@@ -86,7 +86,7 @@ class Stages:
         )
         # the search may pass through states that are led to; what it returns opens
         self.required = settings.requirements
-        self.dataset = dataset.requiring(replace(self.required, opening=False))
+        self.dataset = dataset.requiring(replace(self.required, opening=False, samples=0))
         self.settings = settings
         self.rule = rule_of(parts, dataset.group_designs)
         self.store, self.observer = store or NoStore(), observer or (lambda event: None)
@@ -245,12 +245,43 @@ class Stages:
         secured."""
         return self.confirmed(self.opened(result) if self.dataset.requirements.opening else result)
 
-    def secured(self) -> Stages:
+    def secured(self, forgiving: bool = False) -> Stages:
         """The same stages with designs kept on the branch along which they open: reassigned ones
-        are judged where they open into, and steps that leave the branch are refused."""
+        are judged where they open into, and steps that leave the branch are refused.
+
+        forgiving : steps to where errors of the workshop make a design snap are refused as well
+        """
         other = copy(self)
-        other.dataset = self.dataset.requiring(self.required)
+        samples = self.required.samples if forgiving else 0
+        other.dataset = self.dataset.requiring(replace(self.required, samples=samples))
         return other
+
+    def calmer(self, factor: float) -> Stages:
+        """The same stages with all terms but the fit weighing more: less stress and energy leave a
+        design fewer shapes to snap into."""
+        other = copy(self)
+        weights = self.dataset.weights
+        more = {name: factor * w for name, w in weights.of_terms().items() if name != "fit"}
+        other.dataset = replace(self.dataset, weights=Weights.of({**weights.to_dict(), **more}))
+        return other
+
+    def weighed(self, result: StageResult) -> StageResult:
+        """The same result judged by the weights of these stages, without the states on the way."""
+        found = {
+            n: (d.q, dict(d.equilibria))
+            for n, d in enumerate(result.designs)
+            if isinstance(d, Evaluation)
+        }
+        designs = list(result.designs)
+        for n, evaluation in self.dataset.judge(found).items():
+            designs[n] = evaluation
+        return self.confirmed(replace(result, designs=designs))
+
+    def snapping(self, result: StageResult) -> tuple[int, ...]:
+        """The designs of a result that errors of the workshop make snap, where it is required that
+        they don't."""
+        found = {n: d for n, d in enumerate(result.designs) if isinstance(d, Evaluation)}
+        return tuple(self.dataset.requiring(self.required).snapping(found))
 
     def redeployed(self, result: StageResult) -> list[Evaluation | SimulationFailure]:
         """Every design built of the result's parts and deployed from its own starting geometry,

@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from kop_exudyn.analysis.buckling import buckled
 from kop_exudyn.drawing.style import INK, PALETTE, QUIET, style
+from kop_exudyn.search.buckling import buckled
 from kop_exudyn.search.result import STAGES, KitResult
 
 Row = Mapping[str, Any]

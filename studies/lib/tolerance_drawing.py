@@ -10,13 +10,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 
-from kop_exudyn.analysis.tolerance import relative_tolerance, robustness
+from kop_exudyn.analysis.tolerance import robustness
 from kop_exudyn.drawing.style import CYCLE, style
 from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.io.datasets import load_designs
 from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.report.designs import DrawnDesign, DrawnState
 from kop_exudyn.report.kit_drawings import drawn_state
+from kop_exudyn.search.tolerance import relative_tolerance
 
 Found = Mapping[str, Any]  # see `robustness`
 

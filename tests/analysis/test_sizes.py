@@ -1,6 +1,7 @@
 """Kits of neighbouring sizes: larger ones are never worse, and the smallest that will do."""
 
 import copy
+import dataclasses
 
 import numpy as np
 import pytest
@@ -88,6 +89,10 @@ def test_requirements_that_are_missed_are_told(middle):
     swapped.redeployed = list(middle.redeployed)[::-1]
     swapped.stages = {**middle.stages}
     assert any("opens into another" in text for text in unmet(swapped, Requirements(stress=False)))
+    swapped.stages = {"assigned": dataclasses.replace(middle.stages["assigned"], snapping=(1,))}
+    snaps = [text for text in unmet(swapped, Requirements()) if "snaps" in text]
+    assert snaps == ["zigzag 1 snaps with errors of the workshop"]
+    assert unmet(swapped, none) == []
 
 
 def test_a_kit_grows_until_it_is_good_enough_or_is_not(designs, middle):

@@ -8,20 +8,22 @@ import numpy as np
 import pytest
 
 from kop_exudyn.analysis.tolerance import (
-    Tolerance,
-    joint_jacobian,
     predicted_displacements,
     predicted_spread,
-    relative_tolerance,
     robustness,
-    sample_spread,
     sampled_spread,
     shares_by_kind,
-    usual_tolerance,
 )
 from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.search import objective
 from kop_exudyn.search.objective import DesignObjective
+from kop_exudyn.search.tolerance import (
+    Tolerance,
+    joint_jacobian,
+    relative_tolerance,
+    sample_spread,
+    usual_tolerance,
+)
 from kop_exudyn.structures.base import design_from_dict
 from kop_exudyn.units import Units
 
@@ -141,9 +143,9 @@ def test_samples_that_snapped_are_counted_and_not_compared_with_the_prediction(b
     design, evaluation = built
     tolerance = relative_tolerance(design, 1e-4, 1e-4)
     (kept,) = robustness(design, evaluation, tolerance, (1,), 2)["sizes"]
-    monkeypatch.setattr("kop_exudyn.analysis.tolerance.snapped", lambda *arguments: True)
+    monkeypatch.setattr("kop_exudyn.search.tolerance.snapped", lambda *arguments: True)
     # nothing is taken to be where its sensitivities say, so that every sample is led back
-    monkeypatch.setattr("kop_exudyn.analysis.tolerance.SAME_STATE", -1.0)
+    monkeypatch.setattr("kop_exudyn.search.tolerance.SAME_STATE", -1.0)
     (lost,) = robustness(design, evaluation, tolerance, (1,), 2)["sizes"]
     assert kept["snapped"] == 0 and lost["snapped"] == 2
     assert "linear_error" in kept and "linear_error" not in lost
@@ -154,7 +156,7 @@ def test_what_ends_where_it_is_predicted_is_not_led_back(built, monkeypatch):
     def never(*arguments):
         raise AssertionError
 
-    monkeypatch.setattr("kop_exudyn.analysis.tolerance.snapped", never)
+    monkeypatch.setattr("kop_exudyn.search.tolerance.snapped", never)
     design, evaluation = built
     assert not any(s.snapped for s in sample_spread(design, evaluation, SMALL, 2))
 

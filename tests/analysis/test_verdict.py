@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kop_exudyn.analysis.tolerance import Sample
 from kop_exudyn.analysis.verdict import Buildable, VerdictSettings, judge
 from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.search.objective import DesignObjective
+from kop_exudyn.search.tolerance import Sample
 from kop_exudyn.structures.base import design_from_dict
 from kop_exudyn.structures.strength import design_strength
 

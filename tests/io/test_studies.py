@@ -73,6 +73,8 @@ samples = 100
     np.testing.assert_array_equal(settings.bounds["linear"][1], [2, 3])
     assert settings.bounds["linear"][0] == 0.1 and settings.bounds["angular"] == (-np.inf, 1.5)
     assert found.verdict == VerdictSettings(length=0.001, samples=100)
+    # the search tries errors as large, in numbers of its own
+    assert settings.requirements == Requirements(length=0.001)
     designs = found.designs()
     assert [design.name for design in designs] == ["two", "one", "more four", "more three"]
     job = found.job_settings(designs, 2)
@@ -120,7 +122,7 @@ def test_the_schema_knows_all_settings(repository):
     assert known == {f.name for f in fields(StageSettings)} - {"constraints", "requirements"}
     assert set(schema["properties"]["requirements"]["properties"]) == {
         field.name for field in fields(Requirements)
-    } - {"penalty"}
+    } - {"penalty", "length", "angle"}
     assert set(schema["properties"]["weights"]["properties"]) == {
         field.name for field in fields(Weights)
     } - {"others"}

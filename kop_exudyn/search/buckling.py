@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from ..errors import SimulationFailure
-from ..search.objective import DesignObjective, Evaluation, Reference
-from ..search.stage_results import SAME_STATE, distance
 from ..structures.base import Design
+from ..structures.opening import SAME_STATE
+from .objective import DesignObjective, Evaluation, Reference
 
 
 def missed_on_return(
@@ -20,7 +20,8 @@ def missed_on_return(
     Returns the largest distance of a joint, as a share of the bounding box. Raises
     SimulationFailure when no equilibrium is found on the way.
     """
-    return distance(objective.design, objective.follow(origin.q, state, steps)[-1], origin)
+    end = objective.follow(origin.q, state, steps)[-1]
+    return objective.apart(origin, end)
 
 
 def snapped(

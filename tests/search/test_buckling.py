@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from kop_exudyn.analysis.buckling import buckled, missed_on_return, snapped
 from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.io.designs import load_design
+from kop_exudyn.search.buckling import buckled, missed_on_return, snapped
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.objective import DesignObjective, Weights
 from kop_exudyn.search.pool import DesignPool

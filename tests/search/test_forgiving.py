@@ -1,0 +1,94 @@
+"""Kits whose designs keep to their shapes whatever errors of the workshop do."""
+
+from dataclasses import replace
+from itertools import count
+
+import numpy as np
+import pytest
+
+from kop_exudyn.errors import SimulationFailure
+from kop_exudyn.io.designs import load_design
+from kop_exudyn.search.assigned import forgiving_stage
+from kop_exudyn.search.dataset import Dataset
+from kop_exudyn.search.objective import DesignObjective, Weights
+from kop_exudyn.search.pool import DesignPool
+from kop_exudyn.search.requirements import Requirements
+from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.stages import Stages
+from kop_exudyn.search.tolerance import forgives
+
+# far larger errors than a workshop makes: this shell snaps with nothing less
+GROSS = Requirements(margin=16.0, samples=8)
+SETTINGS = StageSettings(requirements=GROSS, assigned_steps=6)
+
+
+@pytest.fixture(scope="module")
+def found(repository):
+    """A kit of three parts from where it is sought, which forgives gross errors; the kit that is
+    found without minding them, which doesn't; and two that were found minding them."""
+    shell = load_design(repository / "models" / "small" / "01_sinh.json")
+    with DesignPool([shell]) as pool:
+        pool.prepare()
+        dataset = Dataset.of_pool(pool, Weights.suiting([shell]))
+        stages = Stages(dataset, {"linear": 2, "angular": 1}, SETTINGS)
+        start = stages.secured().kept(stages.direct())
+        careless = stages.secured().assigned(start)
+        careful = stages.secured(forgiving=True).assigned(start, "careful")
+        won = forgiving_stage(stages, careless, (), count(1), start)
+        told = [stages.snapping(result) for result in (start, careless, careful, won)]
+        lost = forgiving_stage(replace_rule(stages), careless, (), count(1))
+        objective = DesignObjective(shell, dataset.weights, pool.references[0], GROSS)
+    return start, careless, careful, won, told, lost, objective
+
+
+def replace_rule(stages):
+    """The same stages with parts that stay as they are."""
+    from copy import copy
+
+    class Fixed:
+        parts_move = False
+
+    other = copy(stages)
+    other.rule = Fixed()
+    return other
+
+
+def test_steps_that_mind_errors_end_where_none_snaps(found):
+    start, careless, careful, _, told, _, _ = found
+    assert told[:3] == [(), (0,), ()]
+    assert careless.merit < careful.merit < start.merit
+
+
+def test_the_next_best_is_found_where_the_best_snaps(found):
+    """It opens by itself as well, and costs some fidelity."""
+    _, careless, careful, won, told, _, objective = found
+    assert told[3] == () and won.snapping == ()
+    assert careless.merit < won.merit <= careful.merit * 1.5
+    opened = objective.redeploy(won.designs[0].q)
+    assert objective.apart(opened, won.designs[0]) < 1e-3
+
+
+def test_where_nothing_helps_the_best_is_kept_and_says_so(found):
+    _, careless, _, _, _, lost, _ = found
+    assert lost.snapping == (0,) and lost.merit == careless.merit
+
+
+def test_own_tolerances_and_none(found):
+    """Errors of nothing are forgiven, and no sample is none that snaps."""
+    *_, objective = found
+    careless = found[1].designs[0]
+    for required in (
+        replace(GROSS, length=0.0, angle=0.0),
+        replace(GROSS, samples=0),
+    ):
+        own = DesignObjective(objective.design, objective.weights, objective.reference, required)
+        assert forgives(own, careless)
+    with DesignPool([objective.design]) as pool:
+        pool.references = [objective.reference]
+        dataset = Dataset.of_pool(pool, objective.weights)
+        assert dataset.requiring(Requirements.none()).snapping({0: careless}) == []
+        moved = replace(careless, q=careless.q + 1e-9)
+        with pytest.raises(SimulationFailure, match="errors of the workshop make it snap"):
+            dataset.requiring(replace(GROSS, opening=False)).completed([careless], [moved])
+        same = dataset.requiring(replace(GROSS, opening=False)).completed([careless], [careless])
+        assert np.array_equal(same[0].q, careless.q)
