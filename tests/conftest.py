@@ -138,9 +138,6 @@ KNOWN_FAULTS = {
     "test_opening_path_closes_step_by_step": "small C-shells are assembled flat now",
     "test_commands_print_what_the_page_shows": "the page's figures wait for another run",
     "test_quick_failure_and_rescue": "nothing snaps in the quick cases with the present models",
-    "test_starting_from_a_larger_kit_is_better_than_from_scratch": (
-        "neighbours' starts are no better than those of the search for starts"
-    ),
 }
 
 

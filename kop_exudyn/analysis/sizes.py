@@ -279,6 +279,8 @@ class _Chain:
             earlier = {s: start.result.stages[s] for s in ("direct", "relaxed")}
             result.stages = {**earlier, **result.stages}
             result.clustering = start.result.clustering
+            relaxed = [event for event in start.result.events if event.stage == "relaxed"]
+            result.events = [*relaxed, *result.events]
             origin = ", ".join(f"{count} {kind}" for kind, count in start.sizes.items())
         found = SizedKit(result, dict(sizes), origin, perf_counter() - begin)
         log.info("%s parts: largest deviation %.3g %%", shown, found.max_percent)

@@ -136,7 +136,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--effort",
         choices=("quick", "normal", "thorough"),
         help="from how many starts the parts are optimised (default: normal, the best two of a "
-        "dozen; quick: that of the relaxed stage alone; thorough: the best eight of many)",
+        "dozen; quick: that of the relaxed stage alone; thorough: the best eight of many, then "
+        "exchanges)",
     )
     parser.add_argument(
         "--published",

@@ -85,7 +85,7 @@ def _draw_stage(ax: Axes, history: History, colours: Mapping[str, str]) -> None:
     ax.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     count = len(history.steps)
     if not count:
-        ax.text(0.5, 0.5, "no steps", transform=ax.transAxes, ha="center", color=QUIET)
+        ax.text(0.5, 0.5, "no steps were needed", transform=ax.transAxes, ha="center", color=QUIET)
         return
     ax.set_xlim(0.4, count + 0.6)
     marker = "o" if count < 60 else None

@@ -120,7 +120,7 @@ def summary_rows(result: KitResult) -> tuple[list[str], list[list]]:
     headings = [
         "design",
         "elements",
-        *(f"{stage}, max %" for stage in (INPUT, *stages)),
+        *(f"{stage.replace('_', ' ')}, max %" for stage in (INPUT, *stages)),
         "assigned, mean %",
         "energy ratio",
         f"largest stress, {unit_of('stress', result.units)}",
@@ -198,9 +198,10 @@ def remarks(result: KitResult, verdicts: bool = False) -> list[str]:
     if len(result.tried) > 1:
         found.append(_about_starts(result.tried))
     return found + [
-        f"The {name} stage ended after {stage.steps} steps: {stage.status}."
+        f"The {name} stage ended after {stage.steps} step{'s' * (stage.steps != 1)}: "
+        f"{stage.status}."
         for name, stage in stages.items()
-        if stage.status
+        if stage.status and name != "published_opened"  # the same steps, only opened
     ]
 
 

@@ -18,9 +18,10 @@ Rows = Sequence[Mapping[str, Any]]
 
 
 def draw_tradeoff(rows: Rows, kind: str, knee: int | None = None) -> Figure:
-    """Four panels over the number of parts of one kind, from rows of `tradeoff_row` in the order of
-    their sizes.
+    """Four panels over the number of parts, from rows of `tradeoff_row` in the order of their
+    sizes; points of which several have one size aren't joined.
 
+    kind : the column that has the numbers: a kind of parts, or "parts" for all together
     knee : number of the row that is marked
     """
     sizes = [row[kind] for row in rows]
@@ -50,7 +51,7 @@ def draw_tradeoff(rows: Rows, kind: str, knee: int | None = None) -> Figure:
         _line(cost, sizes, [row["seconds"] for row in rows], "o-", "blue")
         cost.set(title="Time", ylabel="wall time of each kit, s", ylim=(0, None))
         for ax in axes[1]:
-            ax.set_xlabel(f"{kind} parts")
+            ax.set_xlabel(kind if kind == "parts" else f"{kind} parts")
             whole_numbers(ax, sizes)
         plain_log(fit)
         figure.legend(*fit.get_legend_handles_labels(), loc="outside lower center", ncols=3)
@@ -85,7 +86,7 @@ def _line(
     ax.plot(
         sizes,
         [np.nan if value is None else value for value in values],
-        form,
+        form if len(set(sizes)) == len(sizes) else form.removesuffix("-"),
         color=PALETTE[colour],
         label=label,
         markersize=4.5,

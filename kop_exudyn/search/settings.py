@@ -19,18 +19,21 @@ class Effort:
     shakes : of each
     built : kits of each model from which the designs are built
     optimised : starts, that of the relaxed stage among them, from which the assigned stage runs
+    exchanges : assignments that differ by one or two elements of the best kit's, which are
+        optimised in the end, see exchange.py
     """
 
     clusterings: int
     shakes: int
     built: int
     optimised: int
+    exchanges: int = 0
 
 
 EFFORTS = {
     "quick": Effort(0, 0, 0, 1),
     "normal": Effort(3, 5, 2, 2),
-    "thorough": Effort(8, 10, 8, 8),
+    "thorough": Effort(8, 10, 8, 8, 24),
 }
 
 

@@ -20,6 +20,7 @@ from ..kit.cluster import cluster
 from ..kit.kinds import part_kind
 from ..kit.parts import Assignment, Kit
 from .assigned import assigned_stage
+from .exchange import exchanged
 from .objective import Evaluation
 from .problems import AssignedProblem
 from .reassign import LocalModel, Reassignment, improved
@@ -64,6 +65,7 @@ def assigned_from_starts(
 
     Effort says how many starts are looked for (`StageSettings.effort`). The start of the relaxed
     stage is one of them; they are optimised in the order of J, unless J is far above the lowest.
+    The best one is improved by exchanges in the end, see exchange.py.
     """
     effort = EFFORTS[stages.settings.effort]
     found = []
@@ -85,7 +87,19 @@ def assigned_from_starts(
         )
         if k == 0 or end.merit < best.merit:
             best, which = end, n
-    tried[which] = replace(tried[which], kept=True)
+    numbers = count(1 + _NUMBERS * len(order))
+    settings = stages.settings
+    best = exchanged(
+        stages,
+        best,
+        lambda result: stages.assigned(
+            result,
+            f"assigned-{next(numbers)}",
+            settings.round_steps,
+            settings.assigned_tolerance,
+        ),
+    )
+    tried[which] = replace(tried[which], optimised=best.value, kept=True)
     return replace(best, jumps=built.jumps), tried
 
 
