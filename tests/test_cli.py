@@ -286,7 +286,9 @@ class TestOptimize:
             def summary(stage, n):
                 return {"failed": "no"} if designs[n].name in asked["failed"] else {}
 
-            return SimpleNamespace(designs=designs, summary=summary, buildable=(), verdict=())
+            return SimpleNamespace(
+                designs=designs, summary=summary, buildable=(), verdict=(), warnings=()
+            )
 
         monkeypatch.setattr(kit_run, "optimize_and_report", optimize_and_report)
         return asked

@@ -45,13 +45,15 @@ class Stop:
 
 
 def about_opening(
-    opened: Evaluation | SimulationFailure, moved_percent: float | None
+    opened: Evaluation | SimulationFailure, moved_percent: float | None, given: bool = False
 ) -> list[Stop]:
     """Whether the assembly opens into the state shown.
 
     moved_percent : how far from it it ends, % of the box diagonal
+    given : whether it is the design as given, which no parts can help
     """
-    helps = "more parts, or a thinner section, leave it fewer shapes to open into"
+    some = "a smaller opening" if given else "more parts"
+    helps = f"{some}, or a thinner section, leave it fewer shapes to open into"
     if isinstance(opened, SimulationFailure):
         return [Stop("opening", f"does not open from its assembly: {opened}", helps)]
     if moved_percent is not None and moved_percent > 100 * SAME_STATE:
@@ -63,13 +65,13 @@ def about_opening(
 def about_stress(
     design: Design,
     states: Mapping[str, tuple[Scene, Equilibrium]],
-    inputs: Mapping[str, Equilibrium],
+    inputs: Mapping[str, Equilibrium] | None,
     safety: float = 1.0,
 ) -> tuple[dict[str, float | None], list[Stop]]:
     """Utilisation by state; and whether it keeps to the limit, and which section would.
 
     states : by name, those that a builder sees, with their scenes
-    inputs : by role, equilibria of the design as given
+    inputs : by role, equilibria of the design as given; None where the states are its own
     safety : factor by which the elastic limit is divided
     """
     materials = materials_of(design)
@@ -83,16 +85,18 @@ def about_stress(
     worst = max(known, key=lambda name: known[name])
     limit = "its elastic limit" if safety == 1 else f"its elastic limit over {safety:g}"
     why = f"stressed to {100 * safety * known[worst]:.0f} % of {limit} ({worst} state)"
-    as_given = [found.largest for found in design_strength(design, inputs).values()]
-    own = max((value for value in as_given if value is not None), default=0.0)
-    if safety * own > 1:
-        why += f", and the design as given to {100 * safety * own:.0f} %"
+    if inputs is not None:
+        as_given = [found.largest for found in design_strength(design, inputs).values()]
+        own = max((value for value in as_given if value is not None), default=0.0)
+        if safety * own > 1:
+            why += f", and the design as given to {100 * safety * own:.0f} %"
     beyond = [states[name] for name, value in known.items() if value > 0.5 * known[worst]]
     share = keeping_limit(beyond, materials, 1 / safety)
     if share is None:
         helps = "no thickness near its own keeps the limit: open it less, or bend it less"
     else:
-        helps = f"{_section(design, share)} would keep it with the same parts"
+        helps = f"{_section(design, share)} would keep it"
+        helps += " with the same parts" if inputs is not None else ""
     return utilisation, [Stop("stress", why, helps)]
 
 
@@ -103,12 +107,15 @@ def about_tolerance(
     snapped: int,
     samples: int,
     seed: int = 0,
+    given: bool = False,
 ) -> list[Stop]:
     """What to say where errors of the workshop make a design snap.
 
     tolerance : with which so many of the samples snapped
     seed : of these samples
+    given : whether it is the design as given, which no parts can help
     """
+    more = "a thinner section helps" if given else "more parts help"
     design = objective.design
     why = (
         f"snaps into another shape in {snapped} of {samples} samples with errors of "
@@ -118,9 +125,9 @@ def about_tolerance(
         smaller = tolerance.scaled(0.5**halving)
         found = sample_spread(design, kept, smaller, samples, seed, objective=objective)
         if not any(sample.snapped or sample.failed for sample in found):
-            helps = f"none with errors of {_errors(design, smaller)}; or more parts"
+            helps = f"none with errors of {_errors(design, smaller)}; or else {more}"
             return [Stop("tolerance", why, helps)]
-    return [Stop("tolerance", why, "even an eighth of these errors is too much; more parts help")]
+    return [Stop("tolerance", why, f"even an eighth of these errors is too much; {more}")]
 
 
 def about_loads(

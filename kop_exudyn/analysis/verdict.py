@@ -178,6 +178,7 @@ def judge(
     kept: Evaluation | SimulationFailure,
     opened: Evaluation | SimulationFailure | None = None,
     settings: VerdictSettings = VerdictSettings(),
+    given: bool = False,
 ) -> Buildable:
     """The verdict on a design that is built from a kit; of its parts nothing is said yet, see
     `Buildable.with_parts`.
@@ -189,6 +190,7 @@ def judge(
     opened : of the state that its assembly opens into by itself, or why it opens into none; None
         where that was not looked at
     settings : tolerances and safety
+    given : whether it is the design as given, see `judge_given`
     """
     design = objective.design
     if isinstance(kept, SimulationFailure):
@@ -205,9 +207,11 @@ def judge(
             if moved > 100 * SAME_STATE:
                 role = design.fitted_role.name
                 states[OPENED] = (design.scene(role), opened.equilibria[role])
-        stops += about_opening(opened, moved)
+        stops += about_opening(opened, moved, given)
     inputs = objective.reference.equilibria
-    utilisation, beyond = about_stress(design, {**states, **on_the_way}, inputs, settings.safety)
+    utilisation, beyond = about_stress(
+        design, {**states, **on_the_way}, None if given else inputs, settings.safety
+    )
     stops += beyond
     forgiveness = _forgiveness(objective, kept, settings)
     if not forgiveness.enough:
@@ -218,6 +222,7 @@ def judge(
             forgiveness.snapped,
             forgiveness.samples,
             settings.seed,
+            given,
         )
     deployed = kept.equilibria[design.fitted_role.name]
     checks = []
@@ -242,6 +247,23 @@ def judge(
         None,
         tuple(stops),
     )
+
+
+def judge_given(
+    objective: DesignObjective, settings: VerdictSettings = VerdictSettings()
+) -> Buildable:
+    """The verdict on a design as given: what stops it, no kit can mend.
+
+    objective : of the design, which requires that it opens by itself where that is to be looked at
+    settings : tolerances and safety
+    """
+    kept = objective.judge(objective.design.parameters, dict(objective.reference.equilibria))
+    opened: Evaluation | SimulationFailure
+    try:
+        opened = objective.opened(kept)
+    except SimulationFailure as failure:
+        opened = failure
+    return judge(objective, kept, opened, settings, given=True)
 
 
 def _way(design: Design, opened: Evaluation) -> dict[str, tuple[Scene, Equilibrium]]:

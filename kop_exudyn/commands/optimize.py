@@ -275,8 +275,9 @@ def run(args: argparse.Namespace) -> int:
                 for n, design in enumerate(result.designs)
             ],
             "verdict": list(result.verdict),
+            "warnings": list(result.warnings),
         },
-        "".join(f"{line}\n" for line in (*result.verdict, page)),
+        "".join(f"{line}\n" for line in (*result.verdict, *result.warnings, page)),
     )
     if failed:
         sys.stderr.write(f"kop: these designs can't be built from the kit: {', '.join(failed)}\n")

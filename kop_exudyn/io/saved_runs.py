@@ -78,6 +78,9 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
     verdicts = [entry["buildable"] for entry in data["designs"] if "buildable" in entry]
     if len(verdicts) == len(designs):
         result.buildable, result.verdict = verdicts, data.get("verdict", ())
+    given = [entry["input"].get("buildable") for entry in data["designs"] if "input" in entry]
+    if len(given) == len(designs) and None not in given:
+        result.given, result.warnings = given, data.get("warnings", ())
     for stage in STAGES:
         outcomes = [
             _outcome(objective, stage, states, entry, q if stage == _LAST else None)

@@ -92,6 +92,8 @@ def _page(
         page.text(about)
     else:
         page = Page(title, about)
+    if result.warnings:
+        page.text("\n\n".join(result.warnings))
     page.links({"Turn the designs around in 3D": "viewer.html"})
     page.table(
         *summary_rows(result),

@@ -12,19 +12,22 @@ from pathlib import Path
 from tqdm import tqdm
 from tqdm.contrib.logging import logging_redirect_tqdm
 
-from ..analysis.verdict import VerdictSettings
+from ..analysis.verdict import Buildable, VerdictSettings
 from ..fabrication.limits import part_bounds
 from ..io.checkpoint import Job
 from ..io.run_folder import RunFolder
 from ..kit.parts import Kit
 from ..kit.stock import Stock
+from ..search.pool import DesignPool
 from ..search.result import KitResult
 from ..search.run import check_request, described_job, digest, optimize_kit
 from ..search.settings import JobSettings
 from ..search.stage_results import StageEvent
 from ..structures.base import Design
 from .kit_report import write_kit_report
-from .verdicts import give_verdicts
+from .verdicts import give_verdicts, given_verdicts, warning_lines
+
+log = logging.getLogger(__name__)
 
 
 def optimize_and_report(
@@ -43,6 +46,7 @@ def optimize_and_report(
     """Find a kit for these designs; write checkpoints on the way, and results, a verdict on each
     design and a report in the end.
 
+    What stops an input design, and so no kit can mend, is said by a warning before the search.
     Parts have sides long enough for their holes and corners that strips can be joined at, unless
     the settings bound these kinds of parts otherwise, see `part_bounds`.
 
@@ -70,7 +74,15 @@ def optimize_and_report(
     if not inputs:
         job |= {"parameters": {design.name: digest(design.parameters) for design in designs}}
     folder = RunFolder.open(out, Job.of(job, inputs), resume=resume, overwrite=overwrite)
+    required = settings.stages.requirements
+    verdict = replace(verdict, safety=required.safety)
+    given: list[Buildable] = []
     with progress_bar(progress) as bar:
+
+        def examine(pool: DesignPool) -> None:
+            given.extend(given_verdicts(pool, verdict, required))
+            for line in warning_lines(given):
+                log.warning("%s", line)
 
         def observe(event: StageEvent) -> None:
             bar.set_postfix_str(f"{event.sqp}: J = {event.record.value:.4g}", refresh=False)
@@ -84,9 +96,11 @@ def optimize_and_report(
             store=folder.store,
             observer=observe,
             announce=bar.set_description_str,
+            examine=examine,
         )
+        result.given = [one.to_dict() for one in given]
+        result.warnings = warning_lines(given)
         bar.set_description_str("verdicts")
-        verdict = replace(verdict, safety=settings.stages.requirements.safety)
         verdicts = give_verdicts(result, verdict, settings.jobs)
     write_kit_report(result, folder.path, verdicts)
     return result

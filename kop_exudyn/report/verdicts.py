@@ -4,15 +4,17 @@ others."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ..analysis.verdict import Buildable, VerdictSettings, judge
+from ..analysis.verdict import Buildable, VerdictSettings, judge, judge_given
 from ..errors import SimulationFailure
 from ..fabrication.limits import cutting_problems
 from ..search.objective import Weights
 from ..search.pool import DesignPool
+from ..search.requirements import Requirements
 from ..search.result import KitResult
 from ..units import Units, in_millimetres, unit_of
 
@@ -50,6 +52,41 @@ def give_verdicts(
     result.buildable = [one.to_dict() for one in verdicts]
     result.verdict = verdict_lines(verdicts, result.units)
     return verdicts
+
+
+def given_verdicts(
+    pool: DesignPool, settings: VerdictSettings, requirements: Requirements
+) -> list[Buildable]:
+    """The verdicts on input designs as they are given, before a kit is sought for them.
+
+    pool : with the input designs simulated
+    settings : tolerances, samples, safety
+    requirements : what of all this is asked for
+    """
+    asked = replace(settings, samples=min(settings.samples, requirements.samples))
+    found = pool.map(
+        judge_given, Weights(), dict.fromkeys(range(len(pool.designs)), (asked,)), requirements
+    )
+    verdicts = []
+    for verdict in found.values():
+        if isinstance(verdict, SimulationFailure):
+            raise verdict
+        left_out = {
+            cause
+            for cause, asked_for in (
+                ("opening", requirements.opening),
+                ("stress", requirements.stress),
+            )
+            if not asked_for
+        }
+        stops = tuple(stop for stop in verdict.stops if stop.cause not in left_out)
+        verdicts.append(replace(verdict, stops=stops))
+    return verdicts
+
+
+def warning_lines(given: Sequence[Buildable]) -> list[str]:
+    """What stops designs as they are given, a line each."""
+    return [f"As given, {stopped(verdict)}" for verdict in given if not verdict.possible]
 
 
 def verdict_lines(verdicts: Sequence[Buildable], units: Units | None = None) -> tuple[str, str]:

@@ -46,6 +46,8 @@ class KitResult:
     buildable : by design, whether it can be built from the kit and what stops it, as plain data;
         empty where that was not looked at
     verdict : the same in words: which can be built, and what stops the others
+    given, warnings : the same of the input designs, which no kit can mend; no warning where nothing
+        stops them
     equilibria, newton_iterations : solved in all
     settings : as given, for the record
     """
@@ -66,6 +68,8 @@ class KitResult:
     seconds: dict[str, float] = field(default_factory=dict)
     buildable: Sequence[Mapping[str, Any]] = ()
     verdict: Sequence[str] = ()
+    given: Sequence[Mapping[str, Any]] = ()
+    warnings: Sequence[str] = ()
 
     @property
     def units(self) -> Units | None:
@@ -137,11 +141,15 @@ class KitResult:
         return {
             "units": None if self.units is None else self.units.to_dict(),
             **({"verdict": list(self.verdict)} if self.verdict else {}),
+            **({"warnings": list(self.warnings)} if self.warnings else {}),
             "designs": [
                 {
                     "name": design.name,
                     "elements": design.n_elements,
-                    "input": self.input_summary(n),
+                    "input": {
+                        **self.input_summary(n),
+                        **({"buildable": dict(self.given[n])} if self.given else {}),
+                    },
                     **{stage: self.summary(stage, n) for stage in STAGES if stage in self.stages},
                     **({"redeployed": self.redeployment(n)} if self.redeployed else {}),
                     **({"buildable": dict(self.buildable[n])} if self.buildable else {}),

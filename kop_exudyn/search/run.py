@@ -42,6 +42,7 @@ def optimize_kit(
     store: Store | None = None,
     observer: Observer | None = None,
     announce: Callable[[str], None] = lambda phase: None,
+    examine: Callable[[DesignPool], None] = lambda pool: None,
 ) -> KitResult:
     """Find a kit of so many parts a kind for all designs; or build the designs from a given kit.
 
@@ -59,6 +60,7 @@ def optimize_kit(
     store : keeps checkpoints, from which an interrupted run goes on
     observer : sees every accepted step
     announce : is told the phases' names
+    examine : looks at the input designs, once they are simulated and before any kit is sought
 
     Raises
     ------
@@ -80,6 +82,7 @@ def optimize_kit(
     with DesignPool(designs, settings.jobs) as pool:
         announce("input designs")
         pool.prepare()
+        examine(pool)
         weights = settings.weights or Weights.suiting(designs)
         dataset = Dataset.of_pool(pool, weights, settings.design_weights)
         free = replace(settings.stages, requirements=Requirements.none())
