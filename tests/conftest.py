@@ -135,7 +135,6 @@ def parts(shells, clustering):
 # Faults that are known and not mended yet, each with what is wrong: the tests stay as they are, and
 # an entry goes when its fault does.
 KNOWN_FAULTS = {
-    "test_opening_path_closes_step_by_step": "small C-shells are assembled flat now",
     "test_commands_print_what_the_page_shows": "the page's figures wait for another run",
     "test_quick_failure_and_rescue": "nothing snaps in the quick cases with the present models",
 }

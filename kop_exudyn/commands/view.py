@@ -46,7 +46,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         type=not_negative,
         default=8,
         metavar="N",
-        help="states to solve for on the way to the opening (default: 8)",
+        help="states to show on the way to the opening, at most (default: 8)",
     )
     parser.add_argument("--overwrite", action="store_true", help="replace the page if it exists")
     add_json(parser)

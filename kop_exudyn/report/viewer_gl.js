@@ -31,7 +31,7 @@ function between(a, b, t) {
   }
   return {...a, turns, places: mix(a.places, b.places), joints: mix(a.joints, b.joints), corners: mix(a.corners, b.corners),
           deviation: mix(a.deviation, b.deviation), utilisation: mix(a.utilisation, b.utilisation),
-          opening: a.opening + t * (b.opening - a.opening), note: ""};
+          opening: a.opening === null ? null : a.opening + t * (b.opening - a.opening), note: ""};
 }
 
 // Collects triangles: place, normal, colour, id (part + 1; 0: none).

@@ -23,7 +23,8 @@ from ..scene.scene import Scene
 from ..search.objective import Evaluation
 from ..search.result import KitResult
 from ..structures.base import Design, Target
-from ..structures.fitting import Placement, TargetFitting
+from ..structures.fitting import Placement, TargetFitting, best_placement
+from ..structures.opening import SAME_STATE
 from ..structures.strength import design_strength
 from ..units import Units
 from .clipping import clipped
@@ -39,8 +40,7 @@ _NEIGHBOURS = 3  # of a joint: as far as the farthest of them, the target is dra
 def kit_scene(result: KitResult, *, frames: int = 0, title: str | None = None) -> ViewerScene:
     """The designs of a kit optimisation in all stages, inputs first.
 
-    frames : how many states on the way to the opening to solve for, for the assigned stage of
-        actuated designs
+    frames : how many states on the way to the opening to show at most, in the assigned stage
     """
     parts = parts_list_of(result)
     designs = []
@@ -91,26 +91,54 @@ def viewer_parts(parts: PartsList) -> list[ViewerPart]:
 
 
 def opening_path(
-    design: Design, equilibrium: Equilibrium, role: str, frames: int
+    design: Design, equilibria: Mapping[str, Equilibrium], frames: int
 ) -> list[Equilibrium]:
-    """States of a role on the way from its opening back towards the closed state, as far as they
-    can be followed.
+    """States in which a design is opened from its assembly, backwards, the one before the deployed
+    state first: at most so many, the assembly among them.
 
-    The closed state's opening is that of the design's other actuated role; without one there is no
-    path.
+    equilibria : of all roles
+    frames : how many at most
+    Where the assembly opens into another state than the deployed one, its states are those from
+    there back towards the closed state, as far as they can be followed. Without an actuated
+    assembly there are none then.
     """
-    closed = [r.opening for r in design.roles if r.name != role and r.opening is not None]
-    if equilibrium.opening is None or not closed:
+    final = equilibria[design.fitted_role.name]
+    if frames < 1:
         return []
-    shares, path, last = np.linspace(1, _LEAST_SHARE, frames + 1)[1:], [], equilibrium
+    try:
+        opened = design.opened_through(final.q, equilibria)
+    except SimulationFailure as failure:
+        log.info("%s: its opening isn't shown from the assembly on: %s", design.name, failure)
+        return _closed(design, final, frames)
+    if not opened:
+        return []
+    x, y = (eq.state.positions[design.joints] for eq in (opened[-1], final))
+    placed = best_placement(x, y, np.full(len(x), 1 / len(x)))
+    apart = np.abs(placed.apply(x) - y).max() / design.target.diagonal
+    if apart > SAME_STATE:
+        log.warning(
+            "%s: the assembly opens into another state, %.2g %% of its size away; the opening is "
+            "shown as far back from this one as it can be followed",
+            *(design.name, 100 * apart),
+        )
+        return _closed(design, final, frames)
+    way = opened[:-1]
+    kept = np.unique(np.round(np.linspace(0, len(way) - 1, min(frames, len(way)))).astype(int))
+    return [way[k] for k in kept[::-1]]
+
+
+def _closed(design: Design, final: Equilibrium, frames: int) -> list[Equilibrium]:
+    """States of the deployed role on the way back from its opening to that of another role, as far
+    as they can be followed."""
+    role = design.fitted_role.name
+    closed = [r.opening for r in design.roles if r.name != role and r.opening is not None]
+    if final.opening is None or not closed:
+        return []
+    shares, path, last = np.linspace(1, _LEAST_SHARE, frames + 1)[1:], [], final
     for share in shares:
+        opening = closed[0] + share * (final.opening - closed[0])
         try:
-            last = solve(
-                design.systems[role],
-                last.q,
-                last,
-                closed[0] + share * (equilibrium.opening - closed[0]),
-            )
+            last = solve(design.systems[role], last.q, last, opening)
         except SimulationFailure as failure:
             log.info(
                 "%s: the opening is shown from %.0f %% on: %s", design.name, 100 * share, failure
@@ -157,7 +185,7 @@ class _Drawing:
             state = self._state(stage, role, equilibrium, fit.placement)
             off = f"off target: max {fit.max_percent:.2g} %, mean {fit.mean_percent:.2g} %"
             found.append(replace(state, note=" · ".join(filter(None, (off, state.note)))))
-            path = opening_path(self.design, equilibrium, role, frames) if frames else ()
+            path = opening_path(self.design, equilibria, frames)
             found += [
                 replace(self._state(stage, role, eq, fit.placement), final=False) for eq in path
             ]

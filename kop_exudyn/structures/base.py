@@ -175,6 +175,19 @@ class Design(ABC):
         known already."""
         raise NotImplementedError(f"{self.class_name} designs are assembled in place")
 
+    def opened_through(
+        self, q: np.ndarray, equilibria: Mapping[str, Equilibrium]
+    ) -> list[Equilibrium]:
+        """The states that a builder opens the design through, in order, the deployed one last;
+        none of what is assembled in place.
+
+        q : (nq,) parameters; equilibria : those of the other roles at q
+        Raises SimulationFailure where a state isn't found.
+        """
+        if self.way is None:
+            return []
+        return self.way.opened(self.systems, q, self.assembled(q, equilibria))
+
     @property
     def free(self) -> np.ndarray:
         """(k,) parameters that belong to no element, such as places of supports: no part has to

@@ -22,8 +22,10 @@ from ..equilibrium.newton import NewtonOptions, solve
 from ..equilibrium.sensitivities import Sensitivities
 from ..equilibrium.system import System
 from ..errors import SimulationFailure
+from ..scene.state import State
 
 SAME_STATE = 1e-3  # of the bounding box: states whose joints are this close are one
+_FLAT = 1e-4  # of the bounding box: mean heights of joints that are none
 _MOST_ITERATIONS = 80  # of a correction; what takes longer isn't near the predicted state
 _PARTS = (1, 2, 4)  # of the way between two stations that one is led to the other in
 
@@ -35,8 +37,8 @@ class Station:
     name : as messages and results have it
     scene : name of the scene that it is a state of, see `Design.systems`
     opening : rad, prescribed mean hinge angle, or None without actuation
-    lifted : shape that the builder lifts the assembly to at this station before it is let go, or
-        None; at most one station of a way has one
+    lifted : shape that the builder lifts the assembly to at this station before it is let go, where
+        it lies flat until then, or None; stations after one that has a shape have one, too
     """
 
     name: str
@@ -85,7 +87,7 @@ class Way:
         opening = self.opening
         for station in (*self.stations, self.deployed):
             system, steps = systems[station.scene], [station.opening]
-            if station.lifted is not None:
+            if station.lifted is not None and self.is_flat(before.state):
                 before, opening = station.lifted, None
             if opening is not None and station.opening is not None:
                 steps = [0.5 * (opening + station.opening), station.opening]
@@ -143,7 +145,7 @@ class Way:
         first = next((k for k, s in enumerate(stations) if s.lifted is not None), 0)
         for number, (station, near) in enumerate(zip(stations, (*known, deployed))):
             try:
-                if number > first:
+                if number > first and not (station.lifted and self.is_flat(found[-1].state)):
                     before = systems[self.stations[number - 1].scene]
                     found.append(_led(before, systems[station.scene], q, found[-1], station, parts))
                 else:
@@ -151,6 +153,12 @@ class Way:
             except SimulationFailure as failure:
                 raise failure.within(station.name) from None
         return found
+
+    def is_flat(self, state: State) -> bool:
+        """Whether all joints lie in one plane."""
+        x = state.positions[self.joints]
+        height = np.linalg.svd(x - x.mean(axis=0), compute_uv=False)[-1] / np.sqrt(len(x))
+        return bool(height < _FLAT * self.diagonal)
 
     def apart(self, a: Equilibrium, b: Equilibrium) -> float:
         """The largest distance of a joint in two states at their best placement, as a share of

@@ -12,6 +12,7 @@ from html import unescape
 import numpy as np
 import pytest
 
+from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.io.datasets import load_designs
 from kop_exudyn.report.viewer import (
     ViewerDesign,
@@ -179,15 +180,56 @@ def test_rods_are_shown_with_the_part_that_makes_their_length(result, kit_page):
         assert np.isclose(rest[chain.elements].sum(), lengths[part - 2], rtol=1e-9).any()
 
 
-def test_opening_path_closes_step_by_step(result, kit_page):
-    design, outcome = result.designs[0], result.stages["assigned"].designs[0]
-    path = opening_path(design, outcome.equilibria["deployed"], "deployed", 3)
-    openings = [outcome.equilibria["deployed"].opening] + [eq.opening for eq in path]
+def test_shells_are_shown_opening_from_their_flat_assembly(result, kit_page):
+    for design, outcome, shown in zip(
+        result.designs, result.stages["assigned"].designs, kit_page.designs
+    ):
+        final = outcome.equilibria["deployed"]
+        path = opening_path(design, outcome.equilibria, 3)
+        openings = [final.opening] + [eq.opening for eq in path]
+        closed = next(r.opening for r in design.roles if r.name == "rest")
+        assert len(path) >= 2 and (np.diff(np.abs(np.array(openings) - closed)) < 0).all()
+        assert openings[-1] == closed
+        assert np.ptp(path[-1].state.positions[:, 2]) < 1e-6 * design.target.diagonal
+        assert sum(not s.final for s in shown.states) == len(path)
+        assert len(opening_path(design, outcome.equilibria, 1)) == 1
+        assert opening_path(design, outcome.equilibria, 0) == []
+
+
+def test_a_design_that_opens_into_another_state_is_shown_closing_from_its_own(repository, caplog):
+    """As far as it can be followed: here from the mirror image, which is as good an equilibrium."""
+    design = load_designs(repository / "models" / "small", ["01_sinh"])[0]
+    equilibria, flip = design.deploy(), np.diag([1.0, 1.0, -1.0])
+    final = equilibria["deployed"]
+    path = opening_path(design, equilibria, 3)
+    assert len(path) == 3 and not caplog.text
+    assert (np.diff([eq.elastic_energy for eq in (final, *path)]) < 0).all()
+    state = replace(
+        final.state,
+        positions=final.state.positions @ flip,
+        rotations=flip @ final.state.rotations @ flip,
+    )
+    mirrored = solve(design.systems["deployed"], final.q, state, final.opening)
+    path = opening_path(design, equilibria | {"deployed": mirrored}, 3)
+    assert "opens into another state" in caplog.text
+    openings = [mirrored.opening] + [eq.opening for eq in path]
     closed = next(r.opening for r in design.roles if r.name == "rest")
-    assert len(path) >= 1 and (np.diff(np.abs(np.array(openings) - closed)) < 0).all()
-    energies = [eq.elastic_energy for eq in path]
-    assert (np.diff([outcome.equilibria["deployed"].elastic_energy, *energies]) < 0).all()
-    assert sum(not s.final for s in kit_page.designs[0].states) == len(path)
+    assert path and (np.diff(np.abs(np.array(openings) - closed)) < 0).all()
+
+
+def test_umbrella_meshes_are_shown_opening_from_their_compact_state(repository):
+    data = json.loads((repository / "models" / "umbrellas" / "dome.json").read_text())
+    design = design_from_dict(data | {"plate_model": "rigid", "arm_elements": 1})
+    equilibria = design.deploy()
+    x = [eq.state.positions[design.joints] for eq in opening_path(design, equilibria, 4)]
+    assert len(x) == 4
+    heights = [np.linalg.svd(y - y.mean(axis=0))[1][2] for y in x]
+    assert heights[-1] < 1e-2 * heights[0]  # the stack is flat
+    steps = np.abs(np.diff([equilibria["deployed"].state.positions[design.joints], *x], axis=0))
+    assert steps.max() < 0.5 * design.target.diagonal  # it stays where it is held
+    page = design_scene(design, equilibria, frames=4)
+    frames = [s for s in page.designs[0].states if not s.final]
+    assert len(frames) == 4 and all(s.opening is None for s in frames)
 
 
 def test_a_single_design_without_parts(result):

@@ -197,7 +197,8 @@ class CShell(Design):
     @cached_property
     def way(self) -> Way:
         """From the flat assembly by growing mean angles, to the side that the smooth design rises
-        to; it is lifted to that one's shape at the first station at which that isn't flat."""
+        to; it is lifted to that one's shape from the first station on at which that isn't flat,
+        until it stays up."""
         end = self.fitted_role.opening
         assert end is not None
         steps = max(1, int(np.ceil(abs(end - self._rest_opening) / _STATION_STEP - 1e-9)))
@@ -214,13 +215,18 @@ class CShell(Design):
             if np.ptp(smooth.state.positions[:, 2]) > _FLAT * self.network.size:
                 shape = self.layout.straightened(smooth.state, self.scene("deployed"))
                 stations[number] = replace(stations[number], lifted=Start(shape, smooth.torque))
-                break
         *way, last = stations
         return Way(self._rest_opening, tuple(way), last, self.joints, self.target.diagonal)
 
     def assembled(self, q: np.ndarray, equilibria: Mapping[str, Equilibrium]) -> Start:
         """The rest state, off the floor."""
         return Start(equilibria["rest"].state, equilibria["rest"].torque)
+
+    def opened_through(
+        self, q: np.ndarray, equilibria: Mapping[str, Equilibrium]
+    ) -> list[Equilibrium]:
+        """The flat assembly, and the states at all stations."""
+        return [equilibria["rest"], *super().opened_through(q, equilibria)]
 
     @property
     def _rest_opening(self) -> float:

@@ -198,6 +198,36 @@ class Umbrella(Design):
                 raise failure from None
         return final.after(*done)
 
+    def opened_through(
+        self, q: np.ndarray, equilibria: Mapping[str, Equilibrium]
+    ) -> list[Equilibrium]:
+        """The compact state and those at the stages of the deployment, each placed like the next
+        one: the last stage moves the open mesh to where it is held."""
+        from ...equilibrium.system import System
+
+        compact, stages, reach = self._path(q, None)
+        found = follow(compact, stages, reach, self.deployment, self.name)
+        system = System(self._model.scene)
+        system.set_parameters(q)
+        energy = system.assemble(compact)
+        first = replace(
+            found[0],
+            state=compact,
+            stress=system.stress(),
+            elastic_energy=energy.elastic,
+            potential=energy.potential,
+        )
+        path = [found[-1]]
+        for state in [*found[-2::-1], first]:
+            if _openness(state.state) < _openness(path[-1].state):  # else a stage tried in vain
+                path.append(replace(state, state=self._placed_like(path[-1].state, state.state)))
+        return path[::-1]
+
+    def _placed_like(self, other: State, state: State) -> State:
+        x, y = (each.positions[self.joints] for each in (state, other))
+        placed = best_placement(x, y, np.full(len(x), 1 / len(x)))
+        return state.transformed(placed.rotation, placed.translation)
+
     def _path(
         self, q: np.ndarray, solve: Solve | None, gentle: bool = False
     ) -> tuple[State, list[Stage], Solver]:
@@ -431,6 +461,11 @@ def _places(given: Sequence[Any] | None, n: int) -> np.ndarray:
     if given is None:
         return np.full((n, 3), np.nan)
     return np.array([[np.nan] * 3 if place is None else place for place in given], float)
+
+
+def _openness(state: State) -> float:
+    """Mean turn of all hinges, rad."""
+    return float(np.abs(state.angles).mean())
 
 
 def _count(data: Mapping[str, Any], field: str, default: int) -> int:
