@@ -12,6 +12,7 @@ from .values import (
     design_selection,
     kit_cost,
     not_negative,
+    not_negative_number,
     part_counts,
     positive,
     positive_number,
@@ -138,6 +139,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="from how many starts the parts are optimised (default: normal, the best two of a "
         "dozen; quick: that of the relaxed stage alone; thorough: the best eight of many, then "
         "exchanges)",
+    )
+    parser.add_argument(
+        "--reuse",
+        type=not_negative_number,
+        metavar="W",
+        help="fewer pieces to make, where the designs are built one after the other: for 1 %% less "
+        "of them the objective may rise by W %% (default: 0)",
     )
     parser.add_argument(
         "--published",
@@ -352,6 +360,7 @@ def _given(args: argparse.Namespace) -> dict[str, Any]:
         "effort": args.effort,
         "seed": args.seed,
         "leaps": args.leaps,
+        "reuse": args.reuse,
         "redeployments": args.redeployments,
         **steps,
     }

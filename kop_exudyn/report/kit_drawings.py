@@ -193,6 +193,12 @@ def remarks(result: KitResult, verdicts: bool = False) -> list[str]:
     found += [_about_strength(design.name, result.summary("assigned", n)) for n, design in own]
     found += [_about_clustering(kind, gap) for kind, gap in result.clustering.items()]
     found = [remark for remark in found if remark]
+    if len(result.designs) > 1 and "stock" not in result.settings:
+        count = result.piece_count()
+        found.append(
+            f"{count.fabricated} pieces have to be made so that the designs can be built one after "
+            f"the other; they have {count.elements} elements."
+        )
     if "published" in result.stages and result.seconds:
         found.append(_about_published(result))
     if len(result.tried) > 1:

@@ -287,7 +287,10 @@ def _each_its_own(
 ) -> StageResult | None:
     """With the parts as they are the designs don't depend on each other: each takes the best of its
     trials, if any."""
-    results = [best, *(trial for trial, _, _ in _several(stages, best, derivatives, keep_parts))]
+    trials = [trial for trial, _, _ in _several(stages, best, derivatives, keep_parts)]
+    if stages.settings.reuse:  # but they do: which pieces are there already is the others' doing
+        return min(trials, key=_value, default=None)
+    results = [best, *trials]
     chosen = [
         min(results, key=lambda result: _share(stages, result, n)) for n in range(len(best.designs))
     ]
@@ -363,6 +366,7 @@ def _trial(
     model = LocalModel.of(
         derivatives, dataset.design_weights, dataset.split(dataset.scales()), damping
     )
+    model = replace(model, piece_cost=stages.piece_cost(best))
     found = reassign(
         stages.assigned_problem(best, range(len(best.designs))), model, frozen, move_parts
     )

@@ -22,6 +22,7 @@ import scipy.sparse as sp
 from ..compiled.library import address, library
 from ..kit.kinds import part_kind
 from ..kit.parts import Assignment, Kit
+from ..kit.reuse import PieceCount
 from ..sqp.qp import QP, QPSolver
 from .objective import DesignDerivatives
 from .problems import AssignedProblem
@@ -36,12 +37,15 @@ class LocalModel:
 
     base : per design, q0 (nq,);  gradients : (nq,);  hessians : (nq, nq), with the damping
     rounding : a gain that can't be told from rounding
+    piece_cost : of a piece that has to be made, so that the designs can be built one after the
+        other
     """
 
     base: tuple[np.ndarray, ...]
     gradients: tuple[np.ndarray, ...]
     hessians: tuple[np.ndarray, ...]
     rounding: float
+    piece_cost: float = 0.0
 
     @classmethod
     def of(
@@ -112,7 +116,8 @@ def reassign(
 
     Where the problem has a stock, no more pieces are used than there are: elements take what is
     left, and exchange what they have. Elements of kinds that realise intervals keep their parts
-    too. Returns None where no element gains by another part, or the constraints can't be met with
+    too. Where pieces cost, what is lowered is the model with the cost of the pieces to be made.
+    Returns None where no element gains by another part, or the constraints can't be met with
     what it would get.
     """
     found = improved(problem, model, frozen, move_parts)
@@ -129,7 +134,7 @@ def improved(
     be met."""
     move_parts = move_parts or best_parts
     before, vector = problem.assignment, problem.variables(np.concatenate(model.base))
-    start = value = model.values(problem.dataset.split(problem.matrix @ vector)).sum()
+    start = value = _cost(problem, vector, model)
     current = problem
     for _ in range(_ROUNDS):
         changed = _sweep(current, vector, model, frozen)
@@ -139,7 +144,7 @@ def improved(
         if moved is None:
             return None
         vector, last = moved, value
-        value = model.values(problem.dataset.split(current.matrix @ vector)).sum()
+        value = _cost(current, vector, model)
         if last - value <= max(_SETTLED * (start - value), model.rounding):
             break
     changes = current.assignment.changes(before)
@@ -147,6 +152,15 @@ def improved(
     return Reassignment(
         problem.kit_of(vector), current.assignment, problem.free_of(vector), predicted, changes
     )
+
+
+def _cost(problem: AssignedProblem, vector: np.ndarray, model: LocalModel) -> float:
+    """The model's value, with the cost of pieces where they have one."""
+    value = float(model.values(problem.dataset.split(problem.matrix @ vector)).sum())
+    if model.piece_cost:
+        count = PieceCount(problem.kit, problem.assignment, problem.dataset.group_designs)
+        value += model.piece_cost * count.fabricated
+    return value
 
 
 def _sweep(
@@ -162,6 +176,9 @@ def _sweep(
     offsets = dataset.offsets
     stock, plenty = problem.stock, np.iinfo(np.int64).max // 2
     spare = None if stock is None else stock.spare(problem.assignment, design_of)
+    count = None
+    if model.piece_cost:
+        count = PieceCount(kit, problem.assignment, design_of)
     changes = 0
     for number, (group, n) in enumerate(zip(problem.assignment.groups, design_of)):
         if n in frozen or len(group.indices) == 0:
@@ -183,7 +200,10 @@ def _sweep(
             model.rounding,
             n_ways,
         )
-        changes += _descend(*state, left)
+        if count is not None and spare is None:
+            changes += _descend_counted(*state, count, group.kind, int(n), model.piece_cost)
+        else:
+            changes += _descend(*state, left)
         while spare is not None and _exchange(*state):
             changes += 1 + _descend(*state, left)
         parts[number], variants[number] = choice // n_ways, choice % n_ways
@@ -262,6 +282,41 @@ def _descend_numpy(
                 q[own] = candidates[which]
                 left[mine] += 1
                 left[which // n_ways] -= 1
+                choice[e] = which
+                changed += 1
+        total += changed
+    return total
+
+
+def _descend_counted(
+    q: np.ndarray,
+    slope: np.ndarray,
+    hessian: np.ndarray,
+    indices: np.ndarray,
+    candidates: np.ndarray,
+    choice: np.ndarray,
+    least: float,
+    n_ways: int,
+    count: PieceCount,
+    kind: str,
+    design: int,
+    cost: float,
+) -> int:
+    """As `_descend` without a stock, where each piece that has to be made costs; the count of
+    pieces is brought up to date as well."""
+    total, changed = 0, 1
+    while changed:
+        changed = 0
+        for e, own in enumerate(indices):
+            mine = int(choice[e]) // n_ways
+            d = candidates - q[own]
+            gains = d @ slope[own] + 0.5 * np.einsum("ci,ij,cj->c", d, hessian[np.ix_(own, own)], d)
+            gains += cost * np.repeat(count.changes(kind, design, mine), n_ways)
+            which = int(np.argmin(gains))
+            if gains[which] < -least and which != choice[e]:
+                slope += d[which] @ hessian[own]
+                q[own] = candidates[which]
+                count.move(kind, design, mine, which // n_ways)
                 choice[e] = which
                 changed += 1
         total += changed

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import SimulationFailure
 from ..kit.optimality import ClusteringGap
 from ..kit.parts import Assignment, Kit
+from ..kit.reuse import PieceCount
 from ..structures.base import Design
 from ..structures.deviation import fit_summary
 from ..structures.fitting import TargetFitting
@@ -96,6 +97,11 @@ class KitResult:
             first = rows.stop
         return found
 
+    def piece_count(self) -> PieceCount:
+        """The pieces of every part by design, and how many have to be made."""
+        owners = np.repeat(np.arange(len(self.designs)), [len(d.groups) for d in self.designs])
+        return PieceCount(self.kit, self.assignment, owners)
+
     def summary(self, stage: str, number: int) -> dict[str, Any]:
         """Fit, energy and confirmation of one design after a stage, or {"failed": why}."""
         outcome = self.stages[stage].designs[number]
@@ -138,6 +144,7 @@ class KitResult:
 
     def to_dict(self) -> dict[str, Any]:
         """As result.json has it."""
+        count = self.piece_count()
         return {
             "units": None if self.units is None else self.units.to_dict(),
             **({"verdict": list(self.verdict)} if self.verdict else {}),
@@ -158,6 +165,7 @@ class KitResult:
             ],
             "kit": {kind: _plain(parts) for kind, parts in self.kit.parts.items()},
             "assignment": self.assignment.to_dict(),
+            "pieces": {"to_make": count.fabricated, "elements": count.elements},
             "clustering": {kind: gap.to_dict() for kind, gap in self.clustering.items()},
             "tried": [asdict(start) for start in self.tried],
             "steps": {

@@ -66,6 +66,9 @@ class StageSettings:
     constraints : on the elements of all designs, see `on_elements`; the baselines "direct" and
         "unrelaxed" keep to them as far as their parts can
     hessian : "exact" or "bfgs"
+    reuse : what fewer pieces are worth that have to be made so that the designs can be built one
+        after the other: for 1 % less of them the objective may rise by this many %. Results are
+        compared by J times the share of fabricated pieces to this power
     effort : "quick", "normal" or "thorough": from how many starts the assigned stage runs, see
         starts.py
     requirements : that the kit's designs have to meet, see there; not those of the baselines
@@ -92,10 +95,13 @@ class StageSettings:
     bounds: Bounds | None = None
     constraints: LinearConstraints | None = None
     hessian: str = "exact"
+    reuse: float = 0.0
     effort: str = "normal"
     requirements: Requirements = Requirements()
 
     def __post_init__(self) -> None:
+        if not 0 <= self.reuse < float("inf"):
+            raise InputError("expected a number from 0 on", field="reuse", value=self.reuse)
         if self.effort not in EFFORTS:
             raise InputError(
                 f"unknown (known: {', '.join(EFFORTS)})", field="effort", value=self.effort

@@ -81,13 +81,16 @@ class StageResult:
     jumps: list[Jump] = field(default_factory=list)
     penalty: float = 0.0
     pressure: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    reuse_factor: float = 1.0
     snapping: tuple[int, ...] = ()
 
     @property
     def merit(self) -> float:
-        """What results are compared by: the objective with what the excess of bounds costs;
-        infinite where a design failed."""
-        return float("inf") if self.value is None else self.value + self.penalty
+        """What results are compared by: the objective with what the excess of bounds costs, times
+        the factor for pieces; infinite where a design failed."""
+        if self.value is None:
+            return float("inf")
+        return (self.value + self.penalty) * self.reuse_factor
 
     @property
     def evaluations(self) -> list[Evaluation]:

@@ -17,6 +17,7 @@ from ..files.arrays import numbers_of
 from ..kit.cluster import cluster
 from ..kit.parts import Assignment, Kit
 from ..kit.projection import Projection
+from ..kit.reuse import PieceCount
 from ..kit.stock import Stock
 from ..sqp.constraints import check_feasible
 from ..sqp.history import SQPState
@@ -212,7 +213,12 @@ class Stages:
     def judged(self, result: StageResult) -> StageResult:
         """The same result with the objective of its designs, and the cost of exceeded bounds."""
         value, penalty = self._value(result.designs)
-        return replace(result, value=value, penalty=penalty)
+        return replace(
+            result,
+            value=value,
+            penalty=penalty,
+            reuse_factor=self._reuse_factor(result.kit, result.assignment),
+        )
 
     def opened(self, result: StageResult) -> StageResult:
         """The same result with every design in the state that it opens into by itself; not
@@ -504,8 +510,29 @@ class Stages:
     ) -> StageResult:
         value, penalty = self._value(designs)
         return StageResult(
-            designs, kit, assignment, steps, value, status, list(jumps), penalty=penalty
+            designs,
+            kit,
+            assignment,
+            steps,
+            value,
+            status,
+            list(jumps),
+            penalty=penalty,
+            reuse_factor=self._reuse_factor(kit, assignment),
         )
+
+    def piece_cost(self, result: StageResult) -> float:
+        """By how much J may rise for a piece less, see `StageSettings.reuse`."""
+        if not self.settings.reuse or result.value is None:
+            return 0.0
+        count = PieceCount(result.kit, result.assignment, self.dataset.group_designs)
+        return self.settings.reuse * (result.value + result.penalty) / count.fabricated
+
+    def _reuse_factor(self, kit: Kit, assignment: Assignment) -> float:
+        if not self.settings.reuse:
+            return 1.0
+        count = PieceCount(kit, assignment, self.dataset.group_designs)
+        return float((count.fabricated / count.elements) ** self.settings.reuse)
 
     def _value(
         self, designs: Sequence[Evaluation | SimulationFailure]

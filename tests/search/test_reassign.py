@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from kop_exudyn.kit.kinds import part_kind
+from kop_exudyn.kit.reuse import PieceCount
 from kop_exudyn.kit.stock import Stock
 from kop_exudyn.search import assigned as rounds
 from kop_exudyn.search import reassign as reassigning
@@ -275,3 +276,32 @@ def test_a_design_that_snaps_is_rescued_by_weight_then_by_parts(stages, direct, 
     assert at_parts.kit.sizes == {kind: count + 2 for kind, count in PARTS.items()}
     assert len(relaxed.jumps) == 3 * 2 and len(at_parts.jumps) == 2
     assert np.isfinite(at_parts.value)
+
+
+def test_pieces_that_cost_are_saved(stages, direct, derivatives):
+    """The model rises by less than the pieces cost that are saved, and the dearer they are, the
+    fewer are left."""
+    plain = model_at(stages, derivatives, 1e-4)
+    problem = stages.assigned_problem(direct, range(2))
+
+    def pieces(assignment):
+        return PieceCount(direct.kit, assignment, stages.dataset.group_designs).fabricated
+
+    first = pieces(direct.assignment)
+    left = [pieces(reassign(problem, plain, move_parts=keep_parts).assignment)]
+    for cost in (0.01 * direct.value, direct.value):
+        found = reassign(problem, replace(plain, piece_cost=cost), move_parts=keep_parts)
+        left.append(pieces(found.assignment))
+        assert found.predicted.sum() < cost * (first - left[-1])
+    assert left[2] < left[0] and left == sorted(left, reverse=True)
+
+
+def test_a_weight_on_pieces_changes_what_the_search_ends_in(stages, direct):
+    few = Stages(stages.dataset, PARTS, replace(stages.settings, reuse=6.0, leaps=0))
+    without = Stages(stages.dataset, PARTS, replace(stages.settings, leaps=0))
+    ends = [assigned_stage(one, one.judged(direct)) for one in (without, few)]
+    counts = [
+        PieceCount(end.kit, end.assignment, stages.dataset.group_designs).fabricated for end in ends
+    ]
+    assert counts[1] < counts[0]
+    assert ends[1].merit < ends[1].value and ends[0].merit == ends[0].value + ends[0].penalty
