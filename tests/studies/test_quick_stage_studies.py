@@ -96,3 +96,11 @@ def test_buildable(run):
     assert all(row["opened max %"] > 0 for row in rows if row["class"] == "C-shells")
     opened = [row for row in rows if row["required"] != "nothing" and row["class"] == "C-shells"]
     assert opened and all(row["opens"] and row["utilisation"] > 0 for row in opened)
+
+
+def test_repeatability(run):
+    data = run("repeatability")
+    (case,) = data["cases"]
+    assert len(data["runs"]) == case["runs"] == 2 and case["smallest J"] > 0
+    values = [one["J"] for one in data["runs"]]
+    assert case["spread of J %"] == 100 * (max(values) / min(values) - 1) > 0
