@@ -14,8 +14,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from kop_exudyn.drawing.render import Light
 from lib.pavilion_scene import framed, pavilion, picture
-from lib.render import Light
 from lib.study import Study
 from lib.study_kits import kits
 

@@ -11,8 +11,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from kop_exudyn.drawing.style import with_palette
-from kop_exudyn.files.files import write_bytes
 from kop_exudyn.io.datasets import load_designs, select_files
 from kop_exudyn.provenance import usable_cores
 from kop_exudyn.report.kit_run import optimize_and_report
@@ -53,8 +51,6 @@ result = optimize_and_report(
     overwrite=True,
     progress=True,
 )
-picture = with_palette((arguments.out / "designs.png").read_bytes(), 128)
-write_bytes(arguments.out / "picture.png", picture, overwrite=True)
 
 # 4. What came out: largest deviation of the joints from the target, in % of its bounding box.
 for n, design in enumerate(designs):

@@ -22,7 +22,9 @@ def svg_text(sheet: Sheet) -> str:
     ]
     for layer, colour in _COLOURS.items():
         lines.append(f'<g id="{layer}" fill="none" stroke="{colour}" stroke-width="0.2">')
-        lines += [_element(shape, height, colour) for shape in sheet.shapes if shape.layer == layer]
+        lines += [
+            shape_element(shape, height, colour) for shape in sheet.shapes if shape.layer == layer
+        ]
         lines.append("</g>")
     return "\n".join([*lines, "</svg>", ""])
 
@@ -32,8 +34,11 @@ def write_svg(path: str | Path, sheet: Sheet, *, overwrite: bool = False) -> Pat
     return write_text(path, svg_text(sheet), overwrite=overwrite)
 
 
-def _element(shape: Shape, height: float, colour: str) -> str:
-    """SVG counts y downwards."""
+def shape_element(shape: Shape, height: float, colour: str) -> str:
+    """A shape as an SVG element; SVG counts y downwards.
+
+    height : of the drawing; colour : of texts
+    """
     if isinstance(shape, Polyline):
         points = " ".join(f"{x:.4f},{height - y:.4f}" for x, y in shape.points)
         return f'<{"polygon" if shape.closed else "polyline"} points="{points}"/>'

@@ -114,39 +114,41 @@ def _cloud(
 
 
 def summary_rows(result: KitResult) -> tuple[list[str], list[list]]:
-    """Headings and rows of the table of all designs: deviations after every stage, then figures of
-    the assigned one."""
-    stages = [stage for stage in STAGES if stage in result.stages]
+    """Headings and rows of the table of all designs as built: elements, energy, stress."""
     headings = [
         "design",
         "elements",
-        *(f"{stage.replace('_', ' ')}, max %" for stage in (INPUT, *stages)),
-        "assigned, mean %",
         "energy ratio",
-        f"largest stress, {unit_of('stress', result.units)}",
+        f"largest stress, {'MPa' if result.units else unit_of('stress', None)}",
         "utilisation",
         "stable",
     ]
+    scale = 1.0 if result.units is None else 1e-6 * result.units.stress_si(1.0)
     rows = []
     for n, design in enumerate(result.designs):
-        found = {stage: result.summary(stage, n) for stage in stages}
-        final = found["assigned"]
-        largest = [
-            _fit(summary, "max_percent") for summary in (result.input_summary(n), *found.values())
-        ]
+        final = result.summary("assigned", n)
+        stress = _worst(final, "equivalent_stress")
         rows.append(
             [
                 design.name,
                 design.n_elements,
-                *largest,
-                _fit(final, "mean_percent"),
                 final.get("energy_ratio"),
-                _worst(final, "equivalent_stress"),
+                None if stress is None else scale * stress,
                 _worst(final, "utilisation"),
                 final.get("stable"),
             ]
         )
     return headings, rows
+
+
+def stage_rows(result: KitResult) -> tuple[list[str], list[list]]:
+    """Headings and rows: the largest deviation of every design's joints after every stage, %."""
+    stages = [stage for stage in STAGES if stage in result.stages]
+    rows = []
+    for n, design in enumerate(result.designs):
+        found = [result.input_summary(n), *(result.summary(stage, n) for stage in stages)]
+        rows.append([design.name, *(_fit(summary, "max_percent") for summary in found)])
+    return ["design", *(f"{stage.replace('_', ' ')}, %" for stage in (INPUT, *stages))], rows
 
 
 def final_states(result: KitResult) -> dict[tuple[str, str, str], Equilibrium]:

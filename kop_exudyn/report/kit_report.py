@@ -7,9 +7,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from PIL import Image
+
 from ..analysis.verdict import Buildable
 from ..drawing.style import save_figure
-from ..files.files import make_folder
+from ..files.files import make_folder, write_bytes
 from ..io.kits import save_kit
 from ..io.results import save_result, save_states
 from ..kit.kinds import part_kind
@@ -18,9 +20,20 @@ from ..units import unit_of
 from .designs import draw_designs
 from .environment import environment
 from .history import draw_history
-from .kit_drawings import drawn_designs, final_states, histories, part_spaces, remarks, summary_rows
-from .page import Page
+from .kit_cards import design_cards, deviation_rows, percent_explained
+from .kit_drawings import (
+    drawn_designs,
+    final_states,
+    histories,
+    part_spaces,
+    remarks,
+    stage_rows,
+    summary_rows,
+)
+from .kit_picture import joined, kit_pictures
+from .page import Drawing, Page
 from .parameters import draw_parameters
+from .part_drawings import part_drawings
 from .verdicts import stopped, verdict_lines, verdict_rows
 from .viewer import save_viewer
 from .viewer_scenes import kit_scene
@@ -40,8 +53,8 @@ def write_kit_report(
     verdicts: Sequence[Buildable] = (),
     extend: Callable[[Page], object] = lambda page: None,
 ) -> Path:
-    """Write result.json, kit.json, states.npz, figures, viewer.html and index.html; files of those
-    names are replaced.
+    """Write result.json, kit.json, states.npz, picture.png, figures, viewer.html and index.html;
+    files of those names are replaced.
 
     result : of a search
     folder : made where it isn't there yet
@@ -63,13 +76,17 @@ def write_kit_report(
     for name, figure in figures.items():
         save_figure(figure, folder / name, overwrite=True)
     save_viewer(folder / "viewer.html", kit_scene(result), overwrite=True)
-    page = _page(result, figures, verdicts, extend)
+    pictures = kit_pictures(result)
+    names = [design.name for design in result.designs]
+    write_bytes(folder / "picture.png", joined(pictures, names), overwrite=True)
+    page = _page(result, figures, pictures, verdicts, extend)
     return page.save(folder / "index.html", overwrite=True)
 
 
 def _page(
     result: KitResult,
     figures: dict,
+    pictures: Sequence[Image.Image | None],
     verdicts: Sequence[Buildable],
     extend: Callable[[Page], object],
 ) -> Page:
@@ -89,43 +106,50 @@ def _page(
         first, second = verdict_lines(verdicts, result.units)
         page = Page(title, first)
         page.text("\n\n".join([second] if _all_possible(verdicts) else _stops(verdicts)))
-        page.text(about)
     else:
         page = Page(title, about)
     if result.warnings:
         page.text("\n\n".join(result.warnings))
+    page.cards(design_cards(result, verdicts, pictures))
+    page.text(
+        f"{about if verdicts else ''}\n\nShown as they open, with their true sections; a colour is "
+        f"a part, the same in all designs. {percent_explained(result)}"
+    )
     page.links({"Turn the designs around in 3D": "viewer.html"})
-    page.table(
-        *summary_rows(result),
-        "Distance of the joints from the target surface, in % of its bounding-box diagonal; "
-        "elastic energy "
-        "relative to the input design's. Input: the designs as given. Direct: every input element "
-        "replaced by "
-        "its part. Unrelaxed: parts then tuned. "
-        "Published: by the published method, led and opened. "
-        " Relaxed: elements still free. Assigned: built "
-        "from the kit. "
-        "Stress: the largest equivalent one (von Mises) in the assigned design's rods, in all of "
-        "its states; "
-        "utilisation: the largest share of the material's elastic limit. A dash: no equilibrium "
-        "found, or no "
-        "section or limit known.",
+    _parts(page, result)
+    page.section("Deviations").table(
+        *deviation_rows(result),
+        "Joints: where rods cross or cells sit. Between joints: all points of the rods, corners "
+        "too; where rods lie beside the target by design, the joints alone.",
     )
     if verdicts:
         page.section("Can they be built?").table(*verdict_rows(verdicts, result.units), _LEGEND)
+    page.section("Energy and stress").table(
+        *summary_rows(result),
+        "Energy ratio: elastic energy over the input design's. Stress: the largest equivalent one "
+        "(von Mises) in the rods, in all states; utilisation: the largest share of the material's "
+        "elastic limit. A dash: no equilibrium found, or no section or limit known.",
+    )
+    page.section("How it was found").table(
+        *stage_rows(result),
+        "Largest deviation of the joints, %. Input: the designs as given. Direct: every input "
+        "element replaced by its part. Unrelaxed: parts then tuned. Published: by the published "
+        "method, led and opened. Relaxed: elements still free. Assigned: built from the kit.",
+    )
     page.text("\n\n".join(remarks(result, verdicts=bool(verdicts))))
-    page.section("The designs").figure(
+    page.figure(
         figures["designs"],
-        "Rods and joints at the best placement on the target; grey: the input design.",
+        "Rods and joints at the best placement on the target, stage by stage; grey: the input "
+        "design.",
         alt="Every design in 3D after the direct projection, the relaxed and the assigned stage",
     )
-    page.section("The optimisation").figure(
+    page.figure(
         figures["history"],
         "The objective and its terms after every accepted step. At a dashed line the weight of the "
         "projection energy changes, and the objective with it.",
         alt="Objective against steps for both stages",
     )
-    page.section("Parts and elements").figure(
+    page.figure(
         figures["parameters"],
         "Elements before and after the relaxed stage, and the final parts.",
         alt="Elements and parts in the space of their parameters",
@@ -146,6 +170,29 @@ def _page(
         f"iterations in {result.wall_s:.0f} s.",
     )
     return page.details("Settings", result.settings).details("Versions and machine", environment())
+
+
+def _parts(page: Page, result: KitResult) -> None:
+    """Every part as a drawing, with its measures and how many pieces each design needs."""
+    drawings, as_cut = part_drawings(result)
+    names = [design.name for design in result.designs]
+    rows = [
+        [
+            one.label,
+            Drawing(one.svg, one.width, f"{one.label}: {one.about}"),
+            one.about,
+            *(one.counts or [None] * len(names)),
+            one.total,
+        ]
+        for one in drawings
+    ]
+    page.section("The parts").drawings(
+        ["part", "drawing", "mm" if as_cut else "measures", *names, "to make"],
+        rows,
+        ("As they are cut, in mm. " if as_cut else "Axes only: no board is known. ")
+        + "All at one scale but for the thinnest, which are enlarged. To make: enough for any one "
+        "of the designs.",
+    )
 
 
 def _all_possible(verdicts: Sequence[Buildable]) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
 from importlib.resources import files
 from numbers import Integral, Real
@@ -18,6 +19,36 @@ from ..files.files import write_text
 from ..files.json_files import to_json
 
 _MEDIA = {"svg": "image/svg+xml", "png": "image/png"}
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A small drawing in a table.
+
+    svg : its file's text; width : pixels; alt : for readers who can't see it
+    """
+
+    svg: str
+    width: float
+    alt: str
+
+
+@dataclass(frozen=True)
+class Card:
+    """A picture with what there is to say of it.
+
+    title : of the card; badge : the shortest judgement
+    good : whether that is good news, None for neither
+    lines : (name, value, whether the value is bad)
+    picture : bytes of a PNG file, or None; alt : for readers who can't see it
+    """
+
+    title: str
+    badge: str
+    good: bool | None
+    lines: Sequence[tuple[str, str, bool]]
+    picture: bytes | None = None
+    alt: str = ""
 
 
 class Page:
@@ -71,6 +102,24 @@ class Page:
         note = f"<caption>{escape(caption)}</caption>" if caption else ""
         self._body.append(
             f'<div class="scroll"><table>{note}<thead><tr>{head}</tr></thead>'
+            f"<tbody>{body}</tbody></table></div>"
+        )
+        return self
+
+    def cards(self, cards: Sequence[Card]) -> Page:
+        """Pictures side by side, each with a title, a badge and short lines under it."""
+        self._body.append(f'<div class="cards">{"".join(map(_card, cards))}</div>')
+        return self
+
+    def drawings(
+        self, headings: Sequence[str], rows: Sequence[Sequence[Any]], caption: str = ""
+    ) -> Page:
+        """A table of which some values are drawings, see `Drawing`; the others as in `table`."""
+        head = "".join(_cell("th", heading, False) for heading in headings)
+        body = "".join(f"<tr>{''.join(map(_drawn_cell, row))}</tr>" for row in rows)
+        note = f"<caption>{escape(caption)}</caption>" if caption else ""
+        self._body.append(
+            f'<div class="scroll"><table class="drawings">{note}<thead><tr>{head}</tr></thead>'
             f"<tbody>{body}</tbody></table></div>"
         )
         return self
@@ -137,6 +186,32 @@ def shown(value: Any) -> str:
     if isinstance(value, Integral):
         return f"{value:,}"
     return f"{value:.4g}" if isinstance(value, Real) else str(value)
+
+
+def _card(card: Card) -> str:
+    kind = {True: "good", False: "bad", None: ""}[card.good]
+    image = '<div class="missing">no equilibrium</div>'
+    if card.picture is not None:
+        data = base64.b64encode(card.picture).decode("ascii")
+        image = f'<img src="data:image/png;base64,{data}" alt="{escape(card.alt)}">'
+    lines = "".join(
+        f"<dt>{escape(name)}</dt>{'<dd class=bad>' if bad else '<dd>'}{escape(value)}</dd>"
+        for name, value, bad in card.lines
+    )
+    return (
+        f'<article>{image}<h3>{escape(card.title)} <span class="badge {kind}">'
+        f"{escape(card.badge)}</span></h3><dl>{lines}</dl></article>"
+    )
+
+
+def _drawn_cell(value: Any) -> str:
+    if isinstance(value, Drawing):
+        data = base64.b64encode(value.svg.encode()).decode("ascii")
+        return (
+            f'<td class="drawing"><img src="data:image/svg+xml;base64,{data}" '
+            f'width="{value.width:.0f}" alt="{escape(value.alt)}"></td>'
+        )
+    return _cell("td", shown(value), _is_number(value))
 
 
 def _is_number(value: Any) -> bool:

@@ -8,19 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib import rcParams
 from matplotlib.figure import Figure
-from scipy.spatial import ConvexHull, cKDTree
+from scipy.spatial import cKDTree
 
 from kop_exudyn.drawing.colours import kit_colours
+from kop_exudyn.drawing.render import Body, Camera, Light, render
 from kop_exudyn.drawing.style import style
 from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.exchange.meshes import sweep, tube
 from kop_exudyn.fabrication.pieces import parts_list_of
 from kop_exudyn.fabrication.placement import PlacedPieces
+from kop_exudyn.report.surroundings import JOINT_COLOUR, balls, ground, person, upright
 from kop_exudyn.search.result import KitResult
 
-from .render import Body, Camera, Light, render
-
-_PAPER, _INK, _JOINT = (0.965, 0.962, 0.955), (0.22, 0.23, 0.26), (0.30, 0.31, 0.33)
 _WOOD = (0.78, 0.68, 0.55)  # rods that belong to no part
 _SLENDERNESS = 250  # size over breadth of rods that have no section of their own
 # of the camera: from top to bottom of the picture, above the ground
@@ -66,7 +65,7 @@ def pavilion(result: KitResult, number: int, span: float, clearance: float = 0.0
     pieces = parts_list_of(result).designs[number]
     chains = PlacedPieces.of(pieces, role).chain_pieces
     colours = _chain_colours(result, chains)
-    turn = _upright(outcome.fit.placement.apply(mesh.vertices))
+    turn = upright(outcome.fit.placement.apply(mesh.vertices))
     rods = outcome.fit.placement.apply(mesh.vertices) @ turn.T
     joints = outcome.fit.placement.apply(state.positions[design.joints]) @ turn.T
     scale = span / np.ptp(rods[:, :2], axis=0).max()
@@ -77,7 +76,7 @@ def pavilion(result: KitResult, number: int, span: float, clearance: float = 0.0
     # joints of umbrella meshes are the centres of their cells
     away, nearest = cKDTree(rods).query(joints)
     bodies = [Body(rods, mesh.faces, colours[mesh.chains[mesh.faces[:, 0]]])]
-    bodies += [_balls(joints[away < breadth], 0.62 * breadth)] if (away < breadth).any() else []
+    bodies += [balls(joints[away < breadth], 0.62 * breadth)] if (away < breadth).any() else []
     bodies += _masts(rods[nearest]) if clearance else []
     return Pavilion(
         design.name,
@@ -106,7 +105,7 @@ def picture(
         np.array([np.cos(azimuth), np.sin(azimuth)]),
         np.array([-np.sin(azimuth), np.cos(azimuth)]),
     )
-    person = _person(np.array([*(0.62 * reach * towards + 0.52 * reach * beside), 0.0]), azimuth)
+    someone = person(np.array([*(0.62 * reach * towards + 0.52 * reach * beside), 0.0]), azimuth)
     target = np.array([0.0, 0.0, 0.42 * building.height])
     direction = np.array([*(np.cos(_RISE) * towards), np.sin(_RISE)])
     half = np.tan(0.5 * _ANGLE)
@@ -114,7 +113,7 @@ def picture(
         max(0.90 * reach / (half * width / height), 0.62 * building.height / half) + 0.7 * reach
     )
     return render(
-        [*building.bodies, person, _ground(9 * reach)],
+        [*building.bodies, someone, ground(9 * reach)],
         Camera(target + distance * direction, target, _ANGLE),
         width,
         height,
@@ -153,32 +152,6 @@ def _breadth(scene, plain: np.ndarray) -> float:
     return float(np.ptp(outline, axis=0).max())
 
 
-def _upright(points: np.ndarray) -> np.ndarray:
-    """Rotation that lays the points' flattest direction along z, bulging upwards."""
-    centred = points - points.mean(axis=0)
-    axes = np.linalg.svd(centred[:: max(1, len(points) // 20000)], full_matrices=False)[2]
-    normal = axes[2]
-    heights = centred @ normal
-    # the rim is farther from the mean than the crown, and has to be below
-    if abs(heights.min()) < heights.max():
-        normal = -normal
-    return np.stack([axes[0], np.cross(normal, axes[0]), normal])
-
-
-def _ground(half: float) -> Body:
-    """A square floor in many triangles, so that those behind the camera can be left out."""
-    x = np.linspace(-half, half, 61)
-    vertices = np.stack([*np.meshgrid(x, x), np.zeros((61, 61))], axis=-1).reshape(-1, 3)
-    corner = (61 * np.arange(60)[:, None] + np.arange(60)).ravel()
-    faces = np.concatenate(
-        [
-            np.stack([corner, corner + 1, corner + 62], axis=1),
-            np.stack([corner, corner + 62, corner + 61], axis=1),
-        ]
-    )
-    return Body.of(vertices, faces, _PAPER, ground=True)
-
-
 def _masts(joints: np.ndarray, radius: float = 0.045) -> list[Body]:
     """Round masts under the four joints farthest out along the diagonals of the plan."""
     plan = joints[:, :2] / np.ptp(joints[:, :2], axis=0)
@@ -191,59 +164,5 @@ def _masts(joints: np.ndarray, radius: float = 0.045) -> list[Body]:
             np.column_stack([ring + joints[foot, :2], np.full(12, z)])
             for z in (0.0, joints[foot, 2])
         ]
-        found.append(Body.of(np.concatenate(rings), tube(2, ring), _JOINT))
+        found.append(Body.of(np.concatenate(rings), tube(2, ring), JOINT_COLOUR))
     return found
-
-
-def _balls(centres: np.ndarray, diameter: float) -> Body:
-    """Small spheres at the joints, as one body."""
-    turn = (np.arange(42) + 0.5) / 42
-    longitude = np.pi * (1 + 5**0.5) * np.arange(42)
-    r = 2 * np.sqrt(turn * (1 - turn))
-    sphere = (
-        0.5
-        * diameter
-        * np.stack([r * np.cos(longitude), r * np.sin(longitude), 1 - 2 * turn], axis=1)
-    )
-    faces = ConvexHull(sphere).simplices
-    vertices = (centres[:, None] + sphere).reshape(-1, 3)
-    every = (faces[None] + len(sphere) * np.arange(len(centres))[:, None, None]).reshape(-1, 3)
-    return Body.of(vertices, every, _JOINT)
-
-
-def _person(place: np.ndarray, facing: float) -> Body:
-    """A standing person, 1.72 m, who looks along an azimuth (rad).
-
-    A stack of ellipses for legs, coat and head, as in an architect's model.
-    """
-    profile = np.array(
-        [  # height, half-width and half-depth, m
-            [0.00, 0.085, 0.12],
-            [0.05, 0.085, 0.10],
-            [0.45, 0.10, 0.085],
-            [0.80, 0.165, 0.11],
-            [1.00, 0.165, 0.115],
-            [1.22, 0.19, 0.12],
-            [1.38, 0.215, 0.115],
-            [1.43, 0.15, 0.085],
-            [1.46, 0.058, 0.06],
-            [1.50, 0.06, 0.065],
-            [1.54, 0.072, 0.085],
-            [1.61, 0.08, 0.098],
-            [1.68, 0.066, 0.08],
-            [1.72, 0.02, 0.03],
-        ]
-    )
-    turn = np.linspace(0, 2 * np.pi, 20, endpoint=False)
-    rings = np.stack(
-        [
-            profile[:, None, 1] * np.cos(turn),
-            profile[:, None, 2] * np.sin(turn),
-            np.broadcast_to(profile[:, None, 0], (len(profile), 20)),
-        ],
-        axis=2,
-    )
-    outline = np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    c, s = np.cos(facing + 0.5 * np.pi), np.sin(facing + 0.5 * np.pi)  # shoulders across
-    turned = rings.reshape(-1, 3) @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])
-    return Body.of(turned + place, tube(len(profile), outline), _INK)

@@ -14,8 +14,10 @@ from kop_exudyn.io.results import load_result, load_states
 from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.kit.parts import Kit
 from kop_exudyn.kit.stock import Stock
+from kop_exudyn.report.kit_cards import deviation_rows
 from kop_exudyn.report.kit_drawings import drawn_designs, histories, part_spaces
 from kop_exudyn.report.kit_run import optimize_and_report
+from kop_exudyn.report.part_drawings import part_drawings
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
 
@@ -45,6 +47,7 @@ def test_the_folder_holds_all_that_is_promised(finished):
         "states.npz",
         "viewer.html",
         "index.html",
+        "picture.png",
         "checkpoints",
     }
     np.testing.assert_array_equal(load_kit(out / "kit.json").vector, result.kit.vector)
@@ -89,6 +92,36 @@ def test_drawings_show_the_result(finished):
     assert spaces["linear"].clouds[0].full.shape == (8, 2)
     assert spaces["angular"].clouds[1].full.shape == (6, 1)
     assert np.all(spaces["angular"].clouds[0].full >= 0)
+
+
+def test_the_page_begins_with_pictures_and_parts(finished):
+    """Before any table: a card a design; then a drawing of every part with its counts, which add up
+    to the elements."""
+    result, out = finished
+    page = (out / "index.html").read_text(encoding="utf-8")
+    cards, parts = page.index('<div class="cards">'), page.index("<h2>The parts</h2>")
+    assert page.index("<h1>") < cards < parts < page.index("<table>")
+    assert page[cards:parts].count("<article><img") == len(result.designs)
+    for n, design in enumerate(result.designs):
+        fit = result.summary("assigned", n)["fit"]
+        assert f"<h3>{design.name} " in page and f"at most {fit['max_percent']:.2g} %" in page
+    drawings, as_cut = part_drawings(result)
+    assert not as_cut  # the toys name no units
+    assert [one.label for one in drawings] == ["A1", "A2", "L1", "L2", "L3"]
+    for n, design in enumerate(result.designs):
+        assert sum(one.counts[n] for one in drawings) == design.n_elements
+
+
+def test_deviations_are_the_same_in_percent_and_units(finished):
+    result, out = finished
+    data = load_result(out / "result.json")
+    headings, rows = deviation_rows(result)
+    assert headings[2] == "joints, max units of length"  # the toys name no units
+    for n, row in enumerate(rows):
+        fit = data["designs"][n]["assigned"]["fit"]
+        diagonal = result.references[n].target.diagonal
+        assert row[1] == fit["max_percent"] == pytest.approx(100 * row[2] / diagonal)
+        assert row[4] == fit["pieces_max_percent"] == pytest.approx(100 * row[5] / diagonal)
 
 
 def test_the_page_names_designs_and_settings(finished):

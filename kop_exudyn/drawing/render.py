@@ -3,8 +3,7 @@ shadows.
 
 A depth buffer finds what the camera sees (Catmull, 1974); depth buffers of many lights find what
 each of them sees (Williams, 1978). The sun is a cone of lights, the sky a hemisphere of them, which
-darkens corners and ground beneath things. All in numba: no graphics card, no window, the same
-picture everywhere.
+darkens corners and ground beneath things. No graphics card, no window, the same picture everywhere.
 """
 
 from __future__ import annotations
@@ -14,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kop_exudyn.compiled.library import address, library
-from kop_exudyn.drawing.colours import to_linear, to_srgb
+from ..compiled.library import address, library
+from .colours import to_linear, to_srgb
 
 _SUN, _SKY = 0.62, 0.62  # share of the light
 # pixels of a light's buffer that its depth is pushed back by, against shadows of a surface on
@@ -104,7 +103,11 @@ def render(
     view = camera.eye - at
     n = np.where(np.sum(n * view, axis=1)[:, None] < 0, -n, n)  # both sides of a face look alike
     radius, centre = _extent(vertices, faces, ground)
-    lit = _light_on(at, n, vertices, faces[~ground], light, radius, centre)
+    one = _shared_light(hit, ground[np.maximum(owner, 0)] & hit, samples)
+    alone = one == np.arange(len(one))
+    lit = np.empty(len(one))
+    lit[alone] = _light_on(at[alone], n[alone], vertices, faces[~ground], light, radius, centre)
+    lit = lit[one]
     base = to_linear(np.asarray(background, float))
     picture = np.tile(base, (h, w, 1))
     colour = to_linear(colours[face]) * lit[:, None]
@@ -114,6 +117,19 @@ def render(
     picture[hit] = (1 - fade) * colour + fade * base
     mean = picture.reshape(height, samples, width, samples, 3).mean(axis=(1, 3))
     return np.clip(to_srgb(np.clip(mean, 0, 1)), 0, 1)
+
+
+def _shared_light(hit: np.ndarray, ground: np.ndarray, samples: int) -> np.ndarray:
+    """Number, for every sample (h, w) that is hit, of the one whose light it takes: on the ground,
+    where light changes slowly, that of its pixel's first sample."""
+    h, w = hit.shape
+    numbers = np.full((h, w), -1)
+    numbers[hit] = np.arange(np.count_nonzero(hit))
+    blocks = numbers.reshape(h // samples, samples, w // samples, samples)
+    soft = ground.reshape(blocks.shape)
+    first = np.broadcast_to(blocks[:, :1, :, :1], blocks.shape)
+    shares = soft & soft[:, :1, :, :1]
+    return np.where(shares, first, blocks).reshape(h, w)[hit]
 
 
 def _joined(bodies: Sequence[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -255,7 +271,9 @@ def _rasterise(
     return owner, best
 
 
-def _rasterise_numpy(xy, value, faces, w, h) -> tuple[np.ndarray, np.ndarray]:
+def _rasterise_numpy(
+    xy: np.ndarray, value: np.ndarray, faces: np.ndarray, w: int, h: int
+) -> tuple[np.ndarray, np.ndarray]:
     owner, best = np.full((h, w), -1, np.int64), np.zeros((h, w))
     for f, corners in enumerate(faces):
         (ax, ay), (bx, by), (cx, cy) = triangle = xy[corners]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lib.render import Body, Camera, Light, render
+from kop_exudyn.drawing.render import Body, Camera, Light, render
 
 LIGHT = Light(sun=(0.0, 0.0, 1.0), softness=1e-3, suns=2, skies=8, buffer=200)
 SQUARE = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)

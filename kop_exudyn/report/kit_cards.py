@@ -1,0 +1,147 @@
+"""What a reader of a kit's page sees first: every design as it stands, with the verdict on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from ..analysis.verdict import Buildable
+from ..search.result import KitResult
+from ..units import Units, in_millimetres
+from .kit_picture import png
+from .page import Card
+
+PERCENT = (
+    "Deviations are distances from the target surface at the best placement, in % of the diagonal "
+    "of the target's bounding box"
+)
+
+
+def design_cards(
+    result: KitResult, verdicts: Sequence[Buildable], pictures: Sequence[Image.Image | None]
+) -> list[Card]:
+    """A card for each design.
+
+    verdicts : on the designs, or none
+    pictures : of the designs, see `kit_pictures`
+    """
+    cards = []
+    for n, (design, picture) in enumerate(zip(result.designs, pictures)):
+        verdict = verdicts[n] if verdicts else None
+        summary = result.summary("assigned", n)
+        badge, good = _badge(verdict, summary)
+        cards.append(
+            Card(
+                design.name,
+                badge,
+                good,
+                _lines(result, n, summary, verdict),
+                None if picture is None else png(picture),
+                f"{design.name}, built from the kit, every part in its colour",
+            )
+        )
+    return cards
+
+
+def percent_explained(result: KitResult) -> str:
+    """The sentence that says once what deviations in percent are of, with each design's
+    diagonal."""
+    diagonals = "; ".join(
+        f"{design.name} {in_millimetres(float(reference.target.diagonal), result.units, 4)}"
+        for design, reference in zip(result.designs, result.references)
+    )
+    return f"{PERCENT} ({diagonals})."
+
+
+def deviation_rows(result: KitResult) -> tuple[list[str], list[list[Any]]]:
+    """Headings and rows: how far each built design is from its target, in percent and in units."""
+    unit = "mm" if result.units is not None else "units of length"
+    scale = 1.0 if result.units is None else 1000 * result.units.metres
+    headings = [
+        "design",
+        "joints, max %",
+        f"joints, max {unit}",
+        "joints, mean %",
+        "between joints, max %",
+        f"between joints, max {unit}",
+        "between joints, mean %",
+    ]
+    rows: list[list[Any]] = []
+    for n, design in enumerate(result.designs):
+        fit = result.summary("assigned", n).get("fit")
+        rows.append(
+            [design.name, *[None] * 6]
+            if fit is None
+            else [
+                design.name,
+                fit["max_percent"],
+                scale * fit["max"],
+                fit["mean_percent"],
+                fit["pieces_max_percent"],
+                scale * fit["pieces_max"],
+                fit["pieces_mean_percent"],
+            ]
+        )
+    return headings, rows
+
+
+def _badge(verdict: Buildable | None, summary: dict[str, Any]) -> tuple[str, bool | None]:
+    if "failed" in summary:
+        return "no equilibrium", False
+    if verdict is None:
+        return "not judged", None
+    return ("can be built", True) if verdict.possible else ("can't be built", False)
+
+
+def _lines(
+    result: KitResult, n: int, summary: dict[str, Any], verdict: Buildable | None
+) -> list[tuple[str, str, bool]]:
+    used = result.pieces()[n]
+    different = " + ".join(
+        f"{np.count_nonzero(counts)} {kind}" for kind, counts in used.items() if counts.any()
+    )
+    total = sum(int(counts.sum()) for counts in used.values())
+    lines = [("pieces", f"{total}, of {different} parts", False)]
+    if "fit" in summary:
+        lines += _off(summary["fit"], result.units)
+    largest = _largest(verdict, summary)
+    if largest is not None:
+        lines.append(("stress", f"{100 * largest:.0f} % of the elastic limit", largest > 1))
+    if verdict is not None:
+        lines += _opening(verdict)
+        lines += [
+            ("loads", f"{check.case.name}: fails at {check.critical:.3g} times", True)
+            for check in verdict.loads
+            if check.critical < check.case.factor
+        ]
+    return lines
+
+
+def _off(fit: dict[str, float], units: Units | None) -> list[tuple[str, str, bool]]:
+    def told(name: str) -> str:
+        return f"at most {fit[f'{name}_percent']:.2g} %, {in_millimetres(fit[name], units)}"
+
+    lines = [("joints off", told("max"), False)]
+    if fit["pieces_max"] != fit["max"]:
+        lines.append(("between them", told("pieces_max"), False))
+    return lines
+
+
+def _largest(verdict: Buildable | None, summary: dict[str, Any]) -> float | None:
+    """The largest utilisation: of all states on the way where a verdict knows them."""
+    if verdict is not None and verdict.largest is not None:
+        return verdict.largest
+    states = summary.get("strength", {}).values()
+    known = [s["utilisation"] for s in states if s["utilisation"] is not None]
+    return max(known, default=None)
+
+
+def _opening(verdict: Buildable) -> list[tuple[str, str, bool]]:
+    if any(stop.cause == "opening" for stop in verdict.stops):
+        moved = verdict.moved_percent
+        where = "not by itself" if moved is None else f"{moved:.2g} % away from the one wanted"
+        return [("opens", where, True)]
+    return [] if verdict.moved_percent is None else [("opens", "into the wanted shape", False)]
