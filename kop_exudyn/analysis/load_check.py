@@ -21,10 +21,10 @@ from ..errors import SimulationFailure
 from ..scene.scene import Scene
 from ..search.stage_results import SAME_STATE
 from ..structures.base import Design
+from ..structures.loading import LoadedState, held_scene, loaded_scene, loaded_state
 from ..structures.loads import LoadCase
 from ..structures.strength import materials_of, rod_strength
 from ..structures.thickness import resolved, thickened_scene
-from .loading import LoadedState, held_scene, loaded_scene, loaded_state
 
 _STEPS = 4  # to the factor that is asked for
 _CLOSE = 1 / 64  # of the factor asked for: the critical one is located as well as that

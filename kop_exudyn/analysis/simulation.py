@@ -20,11 +20,11 @@ from ..scene.limits import HingeLimits
 from ..structures.base import Design
 from ..structures.deviation import fit_summary
 from ..structures.fitting import FitResult, TargetFitting
+from ..structures.loading import LoadedState, loaded_state
 from ..structures.loads import LoadCase
 from ..structures.plausibility import design_doubts
 from ..structures.strength import strength_summary
 from .load_check import LoadCheck, check_load
-from .loading import LoadedState, loaded_state
 
 log = logging.getLogger(__name__)
 

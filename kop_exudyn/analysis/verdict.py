@@ -20,6 +20,7 @@ from ..search.objective import DesignObjective, Evaluation
 from ..search.stage_results import SAME_STATE, distance
 from ..search.tolerance import Tolerance, sample_spread, usual_tolerance
 from ..structures.base import Design
+from ..structures.loading import supports_of
 from .load_check import LoadCheck, check_load
 from .mending import Stop, about_loads, about_opening, about_stress, about_tolerance
 from .tolerance import predicted_spread
@@ -228,7 +229,9 @@ def judge(
     checks = []
     for case in design.load_cases:
         try:
-            checks.append(check_load(design, deployed, case))
+            # supports stay those of the design as given, whatever its shape has become
+            held = supports_of(design, inputs[design.fitted_role.name], case)
+            checks.append(check_load(design, deployed, replace(case, supports=held)))
         except InputError as error:
             stops.append(Stop("load", f"{case.name}: {error}", None))
     stops += about_loads(design, deployed, checks, settings.safety)

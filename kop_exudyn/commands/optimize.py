@@ -168,9 +168,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--without",
-        choices=("opening", "stress", "tolerance", "all"),
+        choices=("opening", "stress", "tolerance", "loads", "all"),
         help="don't require that designs open by themselves, that stress keeps below the elastic "
-        "limit, that errors of the workshop make nothing snap, or anything: to see what that costs",
+        "limit, that errors of the workshop make nothing snap, that loads are carried, or "
+        "anything: to see what that costs",
     )
     parser.add_argument(
         "--samples",
@@ -372,10 +373,9 @@ def _required(args: argparse.Namespace, known: Requirements) -> Requirements:
     from dataclasses import replace
 
     changes: dict[str, Any] = {}
-    if args.without in ("opening", "all"):
-        changes["opening"] = False
-    if args.without in ("stress", "all"):
-        changes["stress"] = False
+    for name in ("opening", "stress", "loads"):
+        if args.without in (name, "all"):
+            changes[name] = False
     if args.without in ("tolerance", "all"):
         changes["samples"] = 0
     if args.safety is not None:

@@ -9,6 +9,7 @@ every term is divided by its own scale, so F doesn't change with units. The term
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from time import perf_counter
@@ -22,10 +23,13 @@ from ..equilibrium.sensitivities import Sensitivities
 from ..errors import InputError, SimulationFailure
 from ..structures.base import Design
 from ..structures.fitting import FitResult, TargetFitting
+from ..structures.load_bound import LoadBound
 from ..structures.opening import SAME_STATE
 from ..structures.stress_bound import NEAR, Rows, StressBound
 from .requirements import Requirements
 from .terms.base import Reference, term_class
+
+log = logging.getLogger(__name__)
 
 # A trial point that takes longer than this is better met by a shorter step.
 _TRIAL = NewtonOptions(max_iterations=80)
@@ -102,7 +106,10 @@ class Evaluation:
     confirmations : Exudyn's, by role; empty until the point is kept
     iterations, solves : Newton iterations and equilibria that it took
     utilisation : by state, the largest equivalent stress over what is allowed; empty where stress
-        is not bounded. States are the roles, and the stations of the way that are known
+        is not bounded. States are the roles, and the stations of the way that are known; under
+        loads the deflections are states of their own
+    loaded : by load case and factor, the states under loads, where they are bounded; empty for a
+        case under which the design gives way
     way : the states at the stations of `Design.way`, known for points that are kept where designs
         have to open by themselves
     """
@@ -117,6 +124,7 @@ class Evaluation:
     solves: int
     utilisation: Mapping[str, float] = field(default_factory=dict)
     way: tuple[Equilibrium, ...] = ()
+    loaded: Mapping[str, Mapping[float, Equilibrium]] = field(default_factory=dict)
 
     @property
     def excess(self) -> dict[str, float]:
@@ -173,6 +181,20 @@ class DesignObjective:
             }
             self._bounds = {name: bound for name, bound in bounds.items() if bound.known}
         self._way = design.way if requirements.opening else None
+        self._loads = self._load_bounds() if requirements.loads else []
+
+    def _load_bounds(self) -> list[LoadBound]:
+        """Those of all load cases that can be looked at; what hinders the others is said by the
+        verdict on the design."""
+        unloaded = self.reference.equilibria[self.design.fitted_role.name]
+        safety = self.requirements.safety if self.requirements.stress else None
+        found = []
+        for case in self.design.load_cases:
+            try:
+                found.append(LoadBound(self.design, case, unloaded, safety))
+            except InputError as error:
+                log.info("%s: %s: %s", self.design.name, case.name, error)
+        return found
 
     def evaluate(
         self, q: np.ndarray, previous: Evaluation | None = None, options: NewtonOptions = _TRIAL
@@ -240,6 +262,23 @@ class DesignObjective:
             raise failure.within(f"{self.design.name}: on its way from the assembly") from None
         return self._with_way(evaluation, way)
 
+    def _with_loads(self, evaluation: Evaluation) -> Evaluation:
+        """The evaluation with its states under loads."""
+        unloaded = evaluation.equilibria[self.design.fitted_role.name]
+        loaded: dict[str, Mapping[float, Equilibrium]] = {}
+        used = dict(evaluation.utilisation)
+        for load in self._loads:
+            loaded[load.case.name] = states = load.loaded(unloaded)
+            used |= load.utilisation(unloaded, states)
+        solved = [state for states in loaded.values() for state in states.values()]
+        return replace(
+            evaluation,
+            loaded=loaded,
+            utilisation=used,
+            iterations=evaluation.iterations + sum(state.iterations for state in solved),
+            solves=evaluation.solves + len(solved),
+        )
+
     def _with_way(self, evaluation: Evaluation, way: Sequence[Equilibrium]) -> Evaluation:
         """The evaluation with the states on its way, and the stresses there."""
         assert self._way is not None
@@ -280,13 +319,16 @@ class DesignObjective:
         for role in self.design.roles:
             terms = [(term, weight) for term, weight in self._terms if term.sees(role)]
             near = evaluation.utilisation.get(role.name, 0.0) > NEAR
-            if not terms and not near:
+            if not terms and not near and not (role.fitted and self._loads):
                 continue
             sensitivities = Sensitivities(
                 self.design.systems[role.name], evaluation.equilibria[role.name]
             )
             if near:
                 bounds[role.name] = self._bounds[role.name].rows(sensitivities)
+            if role.fitted:
+                for load in self._loads:
+                    bounds |= load.rows(sensitivities, evaluation.loaded[load.case.name])
             for term, weight in terms:
                 if model is None:
                     gradient += weight * term.gradient(role, sensitivities, evaluation.fit)
@@ -390,6 +432,8 @@ class DesignObjective:
             len(equilibria),
             {name: bound.utilisation(equilibria[name]) for name, bound in self._bounds.items()},
         )
+        if self._loads:
+            found = self._with_loads(found)
         return self._with_way(found, way) if way else found
 
 

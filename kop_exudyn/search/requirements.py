@@ -16,6 +16,8 @@ class Requirements:
     opening : every design opens by itself: the state that is judged is the one that its assembly
         leads to along the way of `Design.stations`, without a snap
     stress : the equivalent stress stays below the elastic limit in all states that a builder sees
+    loads : every load case of a design's file is carried: deflections keep to their limit, and
+        stress to its own under the factored loads, without giving way
     safety : factor by which the elastic limit is divided
     samples : sets of errors of the workshop that every result of the search is tried with: one that
         makes a design snap into another shape counts like a design that does not open. 0: none
@@ -30,6 +32,7 @@ class Requirements:
 
     opening: bool = True
     stress: bool = True
+    loads: bool = True
     safety: float = 1.0
     samples: int = 10
     length: float | None = None
@@ -38,7 +41,7 @@ class Requirements:
     penalty: float = 0.01
 
     def __post_init__(self) -> None:
-        for name in ("opening", "stress"):
+        for name in ("opening", "stress", "loads"):
             if not isinstance(getattr(self, name), bool):
                 raise InputError("must be true or false", field=name, value=getattr(self, name))
         if not isinstance(self.samples, int) or isinstance(self.samples, bool) or self.samples < 0:
@@ -58,4 +61,4 @@ class Requirements:
     @classmethod
     def none(cls) -> Requirements:
         """Nothing is required: the baselines are made so."""
-        return cls(opening=False, stress=False, samples=0)
+        return cls(opening=False, stress=False, loads=False, samples=0)

@@ -94,7 +94,7 @@ class Design(ABC):
     stress_weight: ClassVar[float] = 0.0
     # Typical change of parameters that belong to no element.
     free_scale: float = 1.0
-    # What acts on the deployed design; the search for a kit is for the unloaded one.
+    # What acts on the deployed design; the shape that a kit is sought for is the unloaded one.
     loads: LoadCase = LoadCase()
     # All cases in which something acts: what the design has to carry, one after the other.
     load_cases: tuple[LoadCase, ...] = ()

@@ -24,7 +24,7 @@ from .base import Design
 from .strength import TRANSVERSE, by_section, cut_ends, material_values, materials_of
 
 NEAR = 0.7  # of the limit: places above it have rows
-_MOST = 40  # rows of a state
+MOST_ROWS = 40  # rows of a state
 _ALIKE = 0.97  # of the largest in an element: its other places have rows of their own from there
 _SHEAR = np.sqrt(3)  # von Mises' factor of shear stresses
 
@@ -132,7 +132,7 @@ class StressBound:
         for places, u in zip(self._places, self._utilisation(equilibrium)):
             near = (u > NEAR) & (u >= _ALIKE * u.max(axis=1, keepdims=True))
             found += [(u[i, k], places, i, k) for i, k in np.argwhere(near)]
-        found = sorted(found, key=lambda row: -row[0])[:_MOST]
+        found = sorted(found, key=lambda row: -row[0])[:MOST_ROWS]
         elements = np.array([places.elements[i] for _, places, i, _ in found], dtype=int)
         unique, number = np.unique(elements, return_inverse=True)
         slope, slope_L = np.zeros((len(found), 6)), np.zeros(len(found))

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from kop_exudyn.analysis.loading import loaded_state
 from kop_exudyn.compiled.library import library
 from kop_exudyn.equilibrium.engines import EXUDYN, FAST, engine
 from kop_exudyn.equilibrium.exudyn_confirm import confirm
@@ -21,6 +20,7 @@ from kop_exudyn.files.json_files import read_json
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.scene.actuators import LinearActuators
 from kop_exudyn.structures.base import Design, design_from_dict
+from kop_exudyn.structures.loading import loaded_state
 from kop_exudyn.structures.loads import LoadCase
 
 from .exudyn_alone import best_alone

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from kop_exudyn.analysis.load_check import carrying_thickness, check_load, critical_factor
-from kop_exudyn.analysis.loading import held_scene
 from kop_exudyn.equilibrium.path import PathOptions, trace_path
 from kop_exudyn.errors import InputError
 from kop_exudyn.scene.loads import DeadForces
 from kop_exudyn.structures.base import design_from_dict
+from kop_exudyn.structures.loading import held_scene
 from kop_exudyn.structures.loads import DeflectionLimit, LoadCase
 
 CORNERS = [0, 4, 20, 24]

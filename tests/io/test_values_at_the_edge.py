@@ -9,12 +9,12 @@ import pytest
 from matplotlib.figure import Figure
 
 import kop_exudyn as kop
-from kop_exudyn.analysis.loading import supports_of
 from kop_exudyn.cli import main
 from kop_exudyn.drawing.style import figure_bytes
 from kop_exudyn.errors import InputError
 from kop_exudyn.files.files import make_folder, read_bytes, write_bytes, write_text
 from kop_exudyn.files.json_files import parse_json
+from kop_exudyn.structures.loading import supports_of
 from kop_exudyn.structures.loads import LoadCase
 
 

@@ -22,9 +22,9 @@ from ..equilibrium.system import System
 from ..errors import InputError, SimulationFailure
 from ..scene.loads import DeadForces, Scaled, with_self_weight
 from ..scene.scene import Scene
-from ..structures.base import Design
-from ..structures.loads import LoadCase, hold_in_place
-from ..structures.strength import Strength, material_values, materials_of, rod_strength
+from .base import Design
+from .loads import LoadCase, hold_in_place
+from .strength import Strength, material_values, materials_of, rod_strength
 
 _STEPS = 4
 _LOWER = 0.5  # of the height: joints below are supports

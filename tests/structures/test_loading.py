@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kop_exudyn.analysis.loading import loaded_state, supports_of
 from kop_exudyn.analysis.simulation import simulate
 from kop_exudyn.cli import main
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.structures.base import design_from_dict
+from kop_exudyn.structures.loading import loaded_state, supports_of
 from kop_exudyn.structures.loads import LoadCase
 from kop_exudyn.structures.strength import materials_of
 
