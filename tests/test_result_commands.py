@@ -76,7 +76,7 @@ def test_view_shows_all_stages_and_the_way_to_the_opening(run, tmp_path, capsys)
             for state in design["states"]
             if state["role"] == "deployed" and state["final"]
         ]
-        wanted = r"off target: max .* %, mean .* % · stress: max \d+ % of its limit"
+        wanted = r"off target: joints at most .* %, .* · stress: max \d+ % of its limit"
         assert all(re.fullmatch(wanted, note) for note in notes)
 
 

@@ -7,8 +7,9 @@
       : value && typeof value === "object" && "i32" in value ? decode(value.i32, Int32Array) : value);
   const $ = id => document.getElementById(id);
   const canvas = $("canvas"), root = document.documentElement;
-  const NONE = [0.66, 0.66, 0.66], JOINT = [0.23, 0.24, 0.26];
-  const chosen = {design: -1, stage: null, role: null, colour: "part", target: true, part: -1, opening: 1};
+  const NONE = [0.66, 0.66, 0.66], JOINT = [0.23, 0.24, 0.26], OVER = [0.86, 0.05, 0.09];
+  const LEAST = 0.0012;  // breadth of what is drawn, times a design's size: about a pixel
+  const chosen = {design: -1, stage: null, role: null, colour: "part", target: true, labels: false, part: -1, opening: 1};
   let renderer, tiles = [], queued = false;
   const camera = new Camera();
 
@@ -47,7 +48,21 @@
     if (chosen.colour === "plain") return () => NONE;
     if (chosen.colour === "part") return piece => rods.part[piece] < 0 ? NONE : scene.parts[rods.part[piece]].colour;
     const values = state[chosen.colour], limit = scene.limits[chosen.colour];
-    return values ? (piece, ring) => scaleColour(values[ring] / limit) : () => NONE;
+    const over = chosen.colour === "utilisation" ? 1 : Infinity;
+    return values ? (piece, ring) => values[ring] > over ? OVER : scaleColour(values[ring] / limit) : () => NONE;
+  }
+
+  // Rings where pieces are stressed most, if that is beyond the elastic limit.
+  function overStressed(rods, state) {
+    const found = [];
+    let ring = 0;
+    for (const n of rods.rings) {
+      let worst = -1;
+      for (let i = ring; i < ring + n; i++) if (state.utilisation?.[i] > 1 && !(state.utilisation[i] <= state.utilisation[worst])) worst = i;
+      if (worst >= 0) found.push(worst);
+      ring += n;
+    }
+    return found;
   }
 
   function rebuild() {
@@ -55,8 +70,12 @@
       const state = stateOf(design);
       design.drawn = state;
       if (!state) continue;
-      const rods = design.rods[state.role], build = new MeshBuilder(), thick = rods.thickness;
-      sweepRods(build, rods, state, colouring(rods, state));
+      design.box ??= {};
+      const box = design.box[state.role] ??= boxOf(design, state.role);
+      const rods = design.rods[state.role], build = new MeshBuilder(), least = LEAST * box.size, thick = Math.max(rods.thickness, least);
+      sweepRods(build, rods, state, colouring(rods, state), least);
+      design.over = overStressed(rods, state);
+      for (const i of design.over) build.ball(state.places.subarray(3 * i, 3 * i + 3), 0.75 * thick, OVER, 0);
       for (let k = 0; k < state.joints.length; k += 3) build.ball(state.joints.subarray(k, k + 3), 0.42 * thick, JOINT, 0);
       for (let k = 0; k < state.corners.length; k += 3) {
         const part = rods.corner_part[k / 3];
@@ -65,8 +84,6 @@
       }
       design.mesh = renderer.upload(build, design.mesh);
       if (design.target && !design.surface) design.surface = renderer.upload(surfaceOf(design.target));
-      design.box ??= {};
-      design.box[state.role] ??= boxOf(design, state.role);
     }
     redraw();
   }
@@ -152,8 +169,57 @@
   function paint() {
     layOut();
     draw();
+    $("overlay").replaceChildren(...tiles.filter(tile => tile.design.drawn).flatMap(overlay));
     root.dataset.drawn = String(1 + Number(root.dataset.drawn || 0));
   }
+
+  // Scale bar, axes and, where asked for, labels of parts over a tile's drawing.
+  function overlay(tile) {
+    const eye = camera.looking(tile.design.box[tile.design.drawn.role]);
+    return [scaleBar(tile, eye), axes(tile, eye), ...(chosen.labels ? partLabels(tile, eye) : [])];
+  }
+
+  function scaleBar(tile, eye) {
+    const scale = eye.scale(tile), most = Math.min(160, 0.35 * tile.w) / scale, unit = 10 ** Math.floor(Math.log10(most));
+    const length = [5, 2, 1].find(k => k * unit <= most * 1.000001) * unit, bar = element("div", "scale-bar");
+    bar.style.left = `${tile.x + 14}px`; bar.style.top = `${tile.y + tile.h - 34}px`; bar.style.width = `${length * scale}px`;
+    bar.textContent = `${Number(length.toPrecision(3))} ${scene.unit}`;
+    return bar;
+  }
+
+  function axes(tile, eye) {
+    const {right, up} = eye.axes, svg = $("axes").content.firstElementChild.cloneNode(true), r = 20;
+    svg.style.left = `${tile.x + tile.w - 72}px`; svg.style.top = `${tile.y + tile.h - 72}px`;
+    ["x", "y", "z"].forEach((name, k) => {
+      const x = r * right[k], y = -r * up[k], line = svg.querySelector(`line.${name}`), text = svg.querySelector(`text.${name}`);
+      line.setAttribute("x2", x); line.setAttribute("y2", y);
+      text.setAttribute("x", 1.38 * x); text.setAttribute("y", 1.38 * y);
+    });
+    return svg;
+  }
+
+  // The nearest pieces' labels, as many as have room.
+  function partLabels(tile, eye) {
+    const {design} = tile, state = design.drawn, rods = design.rods[state.role], found = [];
+    let ring = 0;
+    for (let piece = 0; piece < rods.rings.length; ring += rods.rings[piece++]) {
+      const i = ring + Math.floor((rods.rings[piece] - 1) / 2);
+      if (rods.part[piece] >= 0) found.push({part: rods.part[piece], ...eye.pixel(tile, state.places.subarray(3 * i, 3 * i + 3))});
+    }
+    for (let k = 0; k < rods.corner_part.length; k++)
+      if (rods.corner_part[k] >= 0) found.push({part: rods.corner_part[k], ...eye.pixel(tile, state.corners.subarray(3 * k, 3 * k + 3))});
+    const kept = [], inside = l => l.x > tile.x + 12 && l.x < tile.x + tile.w - 12 && l.y > tile.y + 30 && l.y < tile.y + tile.h - 8;
+    for (const one of found.filter(inside).sort((a, b) => a.depth - b.depth))
+      if (kept.every(other => Math.abs(other.x - one.x) > 28 || Math.abs(other.y - one.y) > 15)) kept.push(one);
+    return kept.map(({part, x, y}) => {
+      const label = element("span", "part-label");
+      label.textContent = scene.parts[part].label;
+      label.style.left = `${x}px`; label.style.top = `${y}px`;
+      return label;
+    });
+  }
+
+  const element = (tag, name) => Object.assign(document.createElement(tag), {className: name});
 
   function pick(x, y) {
     draw(true);
@@ -176,13 +242,14 @@
     const frames = shown().map(d => framesOf(d, chosen.stage, chosen.role));
     $("opening").closest("label").hidden = Math.max(0, ...frames.map(f => f.length)) < 2;
     $("design").value = chosen.design; $("stage").value = chosen.stage; $("role").value = chosen.role;
-    $("colour").value = chosen.colour; $("target").checked = chosen.target; $("opening").value = chosen.opening;
+    $("colour").value = chosen.colour; $("target").checked = chosen.target; $("part-labels").checked = chosen.labels; $("opening").value = chosen.opening;
+    $("part-labels").closest("label").hidden = !scene.parts.length;
     $("target").closest("label").hidden = !scene.designs.some(d => d.target);
     rebuild();
     legend();
     openingText();
     const hash = new URLSearchParams({design: chosen.design, stage: chosen.stage, role: chosen.role, colour: chosen.colour,
-      target: Number(chosen.target), opening: chosen.opening, ...(chosen.part >= 0 && {part: scene.parts[chosen.part].label})});
+      target: Number(chosen.target), labels: Number(chosen.labels), opening: chosen.opening, ...(chosen.part >= 0 && {part: scene.parts[chosen.part].label})});
     history.replaceState(null, "", `#${hash}`);
   }
 
@@ -206,6 +273,7 @@
       box.append(Object.assign(document.createElement("p"), {textContent: title}), bar, ticks);
       if (!shown().some(d => d.drawn?.[chosen.colour])) box.append(Object.assign(document.createElement("p"), {className: "quiet", textContent: "not known for this stage"}));
     }
+    if (shown().some(d => d.drawn && d.over?.length)) box.append(Object.assign(document.createElement("p"), {className: "over", textContent: "Red: stressed beyond the elastic limit"}));
     for (const kind of unique(scene.parts.map(p => p.kind))) {
       const group = document.createElement("div");
       group.className = "parts";
@@ -285,6 +353,7 @@
     });
     new ResizeObserver(paint).observe(canvas);  // before the browser paints: the last drawing would be stretched
     $("target").onchange = e => choose({target: e.target.checked});
+    $("part-labels").onchange = e => choose({labels: e.target.checked});
     $("opening").oninput = e => choose({opening: Number(e.target.value)});
     $("home").onclick = home;
     $("top").onclick = () => { Object.assign(camera, new Camera(), {azimuth: -Math.PI / 2, elevation: 1.5708, zoom: 0.85}); redraw(); };
@@ -299,6 +368,7 @@
     const design = Number(given.get("design") ?? NaN);
     if (Number.isInteger(design) && design >= -1 && design < scene.designs.length) change.design = design;
     if (given.has("target")) change.target = given.get("target") !== "0";
+    if (given.has("labels")) change.labels = given.get("labels") === "1";
     if (given.has("opening")) change.opening = Math.max(0, Math.min(1, Number(given.get("opening")) || 0));
     change.part = scene.parts.findIndex(p => p.label === given.get("part"));
     choose(change);

@@ -112,6 +112,7 @@ class ViewerScene:
     stages : in the order of the menu; the last one with states is shown first
     deviation_limit, utilisation_limit : values at the end of the colour scales; default: the
         largest final one
+    unit : of length, as the scale bar has it
     """
 
     title: str
@@ -120,6 +121,7 @@ class ViewerScene:
     stages: Sequence[str] = ("input", "direct", "unrelaxed", "relaxed", "assigned")
     deviation_limit: float | None = None
     utilisation_limit: float | None = None
+    unit: str = "units"
 
 
 def viewer_page(scene: ViewerScene) -> str:
@@ -164,6 +166,7 @@ def scene_data(scene: ViewerScene) -> dict[str, Any]:
         "stages": list(scene.stages),
         "colourings": [*(["part"] if scene.parts else []), *known] or ["plain"],
         "limits": limits,
+        "unit": scene.unit,
         "scale": value_colours(np.linspace(0, 1, _SCALE_STEPS)).round(4).tolist(),
         "parts": [
             {

@@ -72,11 +72,21 @@ const BALL = (() => {
   return {points, faces};
 })();
 
-// Sweep every rod piece's section along its rings. colourOf(piece, ring) -> [r, g, b].
-function sweepRods(build, rods, state, colourOf) {
+// An outline (y, z) at least as wide and high as asked for, so that thin rods don't vanish between pixels.
+function atLeast(outline, least) {
+  const [y, z] = [0, 1].map(k => {
+    const values = outline.map(p => p[k]), extent = Math.max(...values) - Math.min(...values);
+    return Math.max(1, least / (extent || least));
+  });
+  return outline.map(p => [y * p[0], z * p[1]]);
+}
+
+// Sweep every rod piece's section along its rings. colourOf(piece, ring) -> [r, g, b]; least : breadth of sections.
+function sweepRods(build, rods, state, colourOf, least) {
+  const sections = rods.sections.map(outline => atLeast(outline, least));
   let ring = 0;
   for (let piece = 0; piece < rods.rings.length; piece++) {
-    const outline = rods.sections[rods.section[piece]], k = outline.length, n = rods.rings[piece];
+    const outline = sections[rods.section[piece]], k = outline.length, n = rods.rings[piece];
     const id = rods.part[piece] + 1, places = [], colours = [];
     for (let r = 0; r < n; r++) {
       const i = ring + r, R = rotation(state.turns, 4 * i), x = state.places.subarray(3 * i, 3 * i + 3);
@@ -231,10 +241,26 @@ class Camera {
     return {right: [-sa, ca, 0], up: [-se * ca, -se * sa, ce], back: [ce * ca, ce * sa, se]};
   }
 
+  // From the eye to the centre: fills the tile but for a margin, and for the part in front of the centre, which looks
+  // larger.
+  distance(aspect) {
+    const {size, wide, high} = this.box, half = Camera.HALF;
+    return (1.15 * Math.max(high / half, wide / half / aspect) + 0.25 * size) / this.zoom;
+  }
+
+  // Pixels of a unit of length at the centre of a tile {x, y, w, h}.
+  scale(tile) { return tile.h / 2 / Camera.HALF / this.distance(tile.w / tile.h); }
+
+  // Where a point of space is on the canvas (CSS pixels), and its depth from the eye.
+  pixel(tile, point) {
+    const {right, up, back} = this.axes, {centre: c, size} = this.box, d = V3.sub(point, c);
+    const dot = a => a[0] * d[0] + a[1] * d[1] + a[2] * d[2];
+    const depth = this.distance(tile.w / tile.h) - dot(back), k = tile.h / 2 / Camera.HALF / depth;
+    return {x: tile.x + tile.w / 2 + k * (dot(right) + this.pan[0] * size), y: tile.y + tile.h / 2 - k * (dot(up) + this.pan[1] * size), depth};
+  }
+
   matrices(aspect) {
-    const {right, up, back} = this.axes, {centre: c, size, wide, high} = this.box, half = Math.tan(0.15);
-    // fills the tile but for a margin, and for the part in front of the centre, which looks larger
-    const distance = (1.15 * Math.max(high / half, wide / half / aspect) + 0.25 * size) / this.zoom;
+    const {right, up, back} = this.axes, {centre: c, size} = this.box, half = Camera.HALF, distance = this.distance(aspect);
     const near = Math.max(distance - size, 0.01 * distance), far = distance + size;
     const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     const view = new Float32Array([right[0], up[0], back[0], 0, right[1], up[1], back[1], 0, right[2], up[2], back[2], 0,
@@ -245,3 +271,5 @@ class Camera {
     return {view, projection, near: distance - 0.5 * size, far: distance + 0.5 * size};
   }
 }
+
+Camera.HALF = Math.tan(0.15);  // of the angle of view

@@ -23,10 +23,11 @@ from ..scene.scene import Scene
 from ..search.objective import Evaluation
 from ..search.result import KitResult
 from ..structures.base import Design, Target
-from ..structures.fitting import Placement, TargetFitting, best_placement
+from ..structures.deviation import fit_summary
+from ..structures.fitting import FitResult, Placement, TargetFitting, best_placement
 from ..structures.opening import SAME_STATE
 from ..structures.strength import design_strength
-from ..units import Units
+from ..units import Units, in_millimetres
 from .clipping import clipped
 from .viewer import ViewerDesign, ViewerPart, ViewerRods, ViewerScene, ViewerState
 
@@ -58,7 +59,10 @@ def kit_scene(result: KitResult, *, frames: int = 0, title: str | None = None) -
         designs.append(drawing.finish(states, failed))
     sizes = " and ".join(f"{count} {kind}" for kind, count in result.kit.sizes.items())
     return ViewerScene(
-        title or f"{sizes} parts for {len(designs)} designs", designs, viewer_parts(parts)
+        title or f"{sizes} parts for {len(designs)} designs",
+        designs,
+        viewer_parts(parts),
+        unit=_length(result.units),
     )
 
 
@@ -68,8 +72,14 @@ def design_scene(
     """One design in its final states, as `kop simulate` finds them."""
     drawing = _Drawing(DesignPieces(design, ()), None)
     return ViewerScene(
-        design.name, [drawing.finish(drawing.states("input", equilibria, frames), {})]
+        design.name,
+        [drawing.finish(drawing.states("input", equilibria, frames), {})],
+        unit=_length(design.units),
     )
+
+
+def _length(units: Units | None) -> str:
+    return "units" if units is None else units.length
 
 
 def viewer_parts(parts: PartsList) -> list[ViewerPart]:
@@ -183,13 +193,24 @@ class _Drawing:
                 continue
             fit = self.fitting(equilibrium.state.positions[self.design.joints])
             state = self._state(stage, role, equilibrium, fit.placement)
-            off = f"off target: max {fit.max_percent:.2g} %, mean {fit.mean_percent:.2g} %"
+            off = self._off(fit, equilibrium)
             found.append(replace(state, note=" · ".join(filter(None, (off, state.note)))))
             path = opening_path(self.design, equilibria, frames)
             found += [
                 replace(self._state(stage, role, eq, fit.placement), final=False) for eq in path
             ]
         return found
+
+    def _off(self, fit: FitResult, equilibrium: Equilibrium) -> str:
+        """How far from the target, as the page and the results have it."""
+        found = fit_summary(self.design, self.design.target, fit, equilibrium.state)
+        told = [
+            f"{what} at most {found[f'{name}_percent']:.2g} %, "
+            f"{in_millimetres(found[name], self.design.units)}"
+            for what, name in (("joints", "max"), ("between them", "pieces_max"))
+            if what == "joints" or found["pieces_max"] != found["max"]
+        ]
+        return f"off target: {'; '.join(told)}"
 
     def finish(self, states: Sequence[ViewerState], failed: Mapping[str, str]) -> ViewerDesign:
         """The design with these states."""

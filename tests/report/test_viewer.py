@@ -287,6 +287,29 @@ def test_page_draws_in_chromium(kit_page, tmp_path):
 
 
 @browser
+@pytest.mark.parametrize("utilisation", [0.9, 1.3])
+def test_sizes_labels_and_what_is_stressed_too_much(tmp_path, utilisation):
+    """A scale bar in the scene's unit, axes, labels of the parts where asked for; red only where
+    the elastic limit is passed."""
+    plain = plain_scene()
+    state = two_rods(utilisation=utilisation)
+    design = replace(plain.designs[0], states=[state])
+    scene = replace(plain, designs=[design], unit="mm")
+    page = save_viewer(tmp_path / "page.html", scene)
+
+    def shown(labels: int) -> str:
+        address = f"{page.as_uri()}#labels={labels}"
+        return run_chromium(address, tmp_path, "--dump-dom").stdout.split('id="message"')[0]
+
+    with_labels = shown(1)
+    assert re.search(r'class="scale-bar"[^>]*>[\d.]+ mm<', with_labels)
+    assert with_labels.split('id="overlay"')[1].count("<line ") == 3
+    assert re.findall(r'class="part-label"[^>]*>(\w+)<', with_labels)
+    assert ("beyond the elastic limit" in with_labels) == (utilisation > 1)
+    assert "part-label" not in shown(0).split('id="overlay"')[1]
+
+
+@browser
 def test_picture_has_the_parts_colours(kit_page, tmp_path):
     """Rods of one part coloured, the others pale; all coloured by value in the scale's colours."""
     from matplotlib.image import imread
