@@ -9,14 +9,28 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from lib.index_page import write_index
+from lib.index_page import Chapter, write_index
 
 REPORTS = Path(__file__).resolve().parents[1] / "reports"
 
+# What a user gains, figure by figure: designs, kit, how good, how small, how sure.
+STORY = (
+    Chapter("pavilion", "Large structures from few different parts"),
+    Chapter("two_stage", "One kit builds several designs"),
+    Chapter("direct_vs_relaxed", "Searching beats rounding to the nearest part"),
+    Chapter("kit_size_tradeoff", "How many parts are enough"),
+    Chapter("part_reuse", "The same parts serve many designs"),
+    Chapter("project_new_design", "A new design from a kit that exists"),
+    Chapter("slit_parts", "Adjustable parts bring kits down to a handful"),
+    Chapter("robustness", "What the workshop's errors do"),
+    Chapter("engines", "Every state is confirmed by Exudyn"),
+    Chapter("stress", "It holds under conditions worse than any user's"),
+)
+
 write_index(
     REPORTS,
-    "What kop_exudyn was tried on, and what came of it",
-    "Each report says what was tried, on what and with what result, with its settings, versions "
-    "and times. The "
-    "program of the same name in the folder studies makes it anew.",
+    "A dozen parts, many structures: what kop_exudyn can do, in ten figures",
+    "Each figure leads to its report: what was tried, on what and with what result, with settings, "
+    "versions and times. The program of the same name in the folder studies makes it anew.",
+    STORY,
 )

@@ -1,11 +1,13 @@
-"""The page of all reports: what each found in a sentence or two, with a small picture."""
+"""The page of all reports: a story in figures, each with what it found in a sentence; then the
+other reports, smaller."""
 
 from __future__ import annotations
 
 import base64
 import io
 import re
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from html import escape, unescape
 from importlib.resources import files
 from pathlib import Path
@@ -16,20 +18,40 @@ from kop_exudyn.errors import InputError
 from kop_exudyn.files.files import write_text
 from kop_exudyn.files.json_files import read_json
 
-_SIZE = (560, 340)  # pixels of a thumbnail at most
-_PNG = re.compile(r'<img src="data:image/png;base64,([^"]+)"')
-_SVG = re.compile(r'<img src="(data:image/svg\+xml;base64,[^"]+)"')
+_SIZE = (1080, 720)  # pixels of a picture at most: drawn half as large, sharp on fine screens
+_IMAGE = re.compile(r'<img src="data:image/(png|svg\+xml);base64,([^"]+)"')
 _LARGEST_SVG = 400_000  # characters; larger drawings would make the index heavy
-_STYLE = """ .reports { display: grid; grid-template-columns: repeat(auto-fill, minmax(17rem, 1fr));
-gap: 1.6rem; padding: 0; } .reports li { list-style: none; border: 1px solid #dcdcdc; border-radius:
-6px; overflow: hidden; } .reports a { color: inherit; text-decoration: none; display: block; height:
-100%; } .reports a:hover h2, .reports a:focus h2 { text-decoration: underline; } .reports .picture {
-height: 12rem; display: flex; align-items: center; justify-content: center; background: #fff;
-border-bottom: 1px solid #ececec; }
-.reports img { max-width: 94%; max-height: 11.2rem; margin: 0; }
-.reports h2 { font-size: 1.02rem; margin: 0.9rem 1rem 0.3rem; border: 0; padding: 0; }
-.reports p { font-size: 0.88rem; margin: 0 1rem 1rem; }
+_SENTENCE = re.compile(r"(?<=[a-z0-9%)°])\.\s+(?=[A-Z])")  # the end of one
+_STYLE = """.story, .reports { display: grid; padding: 0; margin: 1.6rem 0; gap: 1.5rem; }
+.story { grid-template-columns: repeat(auto-fill, minmax(min(100%, 27rem), 1fr)); }
+.reports { grid-template-columns: repeat(auto-fill, minmax(17rem, 1fr)); }
+.index li { list-style: none; border: 1px solid var(--line); border-radius: 6px;
+  overflow: hidden; }
+.story li.first { grid-column: 1 / -1; }
+.index a { color: inherit; text-decoration: none; display: block; height: 100%; }
+.index a:hover h3, .index a:focus h3 { text-decoration: underline; }
+.index .picture { display: flex; align-items: center; justify-content: center; background: #fff;
+  border-bottom: 1px solid var(--line); height: 19rem; }
+.reports .picture { height: 11rem; } .story .first .picture { height: auto; }
+.index img { max-width: 97%; max-height: 18.2rem; } .reports img { max-height: 10.4rem; }
+.story .first img { max-width: 100%; max-height: 34rem; }
+.index h3 { font-size: 1.1rem; margin: .8rem 1rem .2rem; } .reports h3 { font-size: .98rem; }
+.index p { font-size: .92rem; margin: 0 1rem 1rem; }
+@media (max-width: 720px) { .index .picture { height: auto; padding: .4rem; } }
 """
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """A figure of the story.
+
+    name : folder of the report; headline : what a reader gains by it
+    picture : number of the image on the report's page, from 0; None: picture.png or the first one
+    """
+
+    name: str
+    headline: str
+    picture: int | None = None
 
 
 @dataclass(frozen=True)
@@ -45,31 +67,49 @@ class Entry:
     picture: str | None
 
 
-def write_index(folder: str | Path, title: str, lead: str) -> Path:
+def write_index(folder: str | Path, title: str, lead: str, story: Sequence[Chapter] = ()) -> Path:
     """Write index.html over all folders of reports in a folder, those with an index.html of their
     own.
 
-    Title and picture are taken from each report's page, the finding from its data.json, or else
-    from the page's lead. Raises InputError when there is no report, or the page can't be written.
+    story : the figures that the page leads with, in their order, as far as there are such reports;
+        the other reports follow
+
+    Titles and pictures are taken from each report's page, findings from its data.json, or else from
+    the page's lead. Raises InputError when there is no report, or the page can't be written.
     """
     folder = Path(folder)
-    entries = [entry_of(page.parent) for page in sorted(folder.glob("*/index.html"))]
-    if not entries:
+    pages = {page.parent.name: page.parent for page in sorted(folder.glob("*/index.html"))}
+    if not pages:
         raise InputError("holds no reports", source=folder)
-    return write_text(folder / "index.html", _html(entries, title, lead), overwrite=True)
+    told = [
+        replace(entry_of(pages[one.name], one.picture), title=one.headline)
+        for one in story
+        if one.name in pages
+    ]
+    others = [entry_of(path) for name, path in pages.items() if name not in {e.name for e in told}]
+    return write_text(folder / "index.html", _html(told, others, title, lead), overwrite=True)
 
 
-def entry_of(folder: Path) -> Entry:
-    """The entry of one report's folder."""
+def entry_of(folder: Path, picture: int | None = None) -> Entry:
+    """The entry of one report's folder.
+
+    picture : number of the image on its page; None: picture.png, or the first one
+    """
     page = (folder / "index.html").read_text(encoding="utf-8")
     data = folder / "data.json"
     finding = read_json(data).get("finding") if data.exists() else None
     return Entry(
         folder.name,
         _text(page, "h1") or folder.name,
-        finding or _text(page, "p") or "",
-        _picture(folder, page),
+        first_sentence(finding or _text(page, "p") or ""),
+        _picture(folder, page, picture),
     )
+
+
+def first_sentence(text: str) -> str:
+    """The first sentence of a text, with its full stop."""
+    first = _SENTENCE.split(text.strip(), maxsplit=1)[0].rstrip(".")
+    return f"{first}." if first else ""
 
 
 def _text(page: str, tag: str) -> str | None:
@@ -77,14 +117,17 @@ def _text(page: str, tag: str) -> str | None:
     return unescape(re.sub(r"<[^>]+>", "", found.group(1))).strip() if found else None
 
 
-def _picture(folder: Path, page: str) -> str | None:
-    """picture.png beside the page, or the page's first figure."""
-    png, svg = _PNG.search(page), _SVG.search(page)
-    if (folder / "picture.png").exists():
+def _picture(folder: Path, page: str, number: int | None) -> str | None:
+    """An image of the page, or picture.png beside it; the next one where a drawing is too heavy."""
+    if number is None and (folder / "picture.png").exists():
         return _thumbnail((folder / "picture.png").read_bytes())
-    if png:
-        return _thumbnail(base64.b64decode(png.group(1)))
-    return svg.group(1) if svg and len(svg.group(1)) <= _LARGEST_SVG else None
+    images = _IMAGE.findall(page)
+    for kind, content in images[number or 0 :]:
+        if kind == "png":
+            return _thumbnail(base64.b64decode(content))
+        if len(content) <= _LARGEST_SVG:
+            return f"data:image/svg+xml;base64,{content}"
+    return None
 
 
 def _thumbnail(content: bytes) -> str:
@@ -92,11 +135,11 @@ def _thumbnail(content: bytes) -> str:
         small = image.convert("RGB")
         small.thumbnail(_SIZE, Image.Resampling.LANCZOS)
         buffer = io.BytesIO()
-        small.quantize(96).save(buffer, "PNG", optimize=True)
+        small.quantize(128).save(buffer, "PNG", optimize=True)
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
 
 
-def _html(entries: list[Entry], title: str, lead: str) -> str:
+def _html(told: list[Entry], others: list[Entry], title: str, lead: str) -> str:
     css = (files("kop_exudyn.report") / "page.css").read_text(encoding="utf-8")
     policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
     return "\n".join(
@@ -113,9 +156,9 @@ def _html(entries: list[Entry], title: str, lead: str) -> str:
             "<body>",
             f"<h1>{escape(title)}</h1>",
             f'<p class="lead">{escape(lead)}</p>',
-            '<ul class="reports">',
-            *map(_item, entries),
-            "</ul>",
+            *_list("story", told),
+            *(["<h2>More of what was tried</h2>"] if told and others else []),
+            *_list("reports", others),
             "</body>",
             "</html>",
             "",
@@ -123,9 +166,16 @@ def _html(entries: list[Entry], title: str, lead: str) -> str:
     )
 
 
-def _item(entry: Entry) -> str:
+def _list(kind: str, entries: list[Entry]) -> list[str]:
+    if not entries:
+        return []
+    return [f'<ul class="index {kind}">', *map(_item, entries, range(len(entries))), "</ul>"]
+
+
+def _item(entry: Entry, number: int) -> str:
     image = f'<img src="{entry.picture}" alt="">' if entry.picture else ""
     return (
-        f'<li><a href="{escape(entry.name)}/index.html"><div class="picture">{image}</div>'
-        f"<h2>{escape(entry.title)}</h2><p>{escape(entry.finding)}</p></a></li>"
+        f'<li{"" if number else " class=first"}><a href="{escape(entry.name)}/index.html">'
+        f'<div class="picture">{image}</div>'
+        f"<h3>{escape(entry.title)}</h3><p>{escape(entry.finding)}</p></a></li>"
     )

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from kop_exudyn.drawing.style import figure_bytes
 from kop_exudyn.errors import InputError
 from kop_exudyn.report.page import Page
-from lib.index_page import write_index
+from lib.index_page import Chapter, first_sentence, write_index
 
 
 def report(folder, title, lead="A lead.", data=None, suffix="png"):
@@ -40,3 +40,26 @@ def test_every_report_is_listed_with_its_finding_and_picture(tmp_path):
 def test_a_folder_without_reports_is_an_error(tmp_path):
     with pytest.raises(InputError, match="no reports"):
         write_index(tmp_path, "All", "Lead.")
+
+
+def test_the_story_comes_first_in_its_order(tmp_path):
+    """Headlines instead of titles, one sentence each; reports that aren't there are left out."""
+    for name in ("a", "b", "c"):
+        report(tmp_path / name, f"Title {name}", data={"finding": f"First of {name}. Second."})
+    story = (Chapter("c", "Gain c"), Chapter("missing", "Nothing"), Chapter("a", "Gain a"))
+    page = write_index(tmp_path, "All", "Lead.", story).read_text()
+    order = [page.index(text) for text in ("Gain c", "First of c.", "Gain a", "More of", "Title b")]
+    assert order == sorted(order) and "Title c" not in page and "Nothing" not in page
+    assert "Second" not in page
+
+
+@pytest.mark.parametrize(
+    ("text", "first"),
+    [
+        ("Of 15 designs 1.4 % are off. The rest", "Of 15 designs 1.4 % are off."),
+        ("One only", "One only."),
+        ("", ""),
+    ],
+)
+def test_a_sentence_ends_at_its_full_stop(text, first):
+    assert first_sentence(text) == first
