@@ -86,7 +86,7 @@ def main() -> None:
         lambda n: grid(n).joints,
         refinements,
         4 if quick else FINE,
-        grid(1).target.diagonal,
+        grid(1).target.size,
         runs,
     )
     ways += three_ways(

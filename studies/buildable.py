@@ -7,7 +7,7 @@ find; that is how kits of parts have been sought so far. Here the same kits are 
 nothing is required; the designs have to open from their assembly into the states that are shown;
 and the equivalent stress has to keep below the elastic limit as well, in the assembly, deployed and
 on the way. C-shells weigh a little stress in all three. Deviations are distances of the joints from
-the target surface in % of its bounding-box diagonal, of the states that the designs open into: what
+the target surface in % of its size, of the states that the designs open into: what
 a builder gets.
 """
 

@@ -7,7 +7,7 @@ nearest part (direct). The parts can then be tuned (unrelaxed). The method inste
 move before they become parts (relaxed), and tunes the parts and their assignment at the end
 (assigned). All four are computed for kits of three classes of structures, and every state shown is
 an equilibrium that Exudyn confirmed. Deviations are distances of the joints from the target surface
-in % of its bounding-box diagonal.
+in % of its size.
 """
 
 from __future__ import annotations
@@ -46,8 +46,7 @@ def main() -> None:
     report.table(
         "designs",
         [{key: row[key] for key in row if not key.endswith("energy")} for row in rows],
-        "Deviations of the joints in % of the bounding-box diagonal. Failed: no equilibrium was "
-        "found.",
+        "Deviations of the joints in % of the target's size. Failed: no equilibrium was found.",
     )
     report.table(
         "energies",

@@ -81,8 +81,7 @@ def main() -> None:
     report.table(
         "pavilions",
         rows,
-        "Deviation: largest distance of a joint from the target surface, in % of its "
-        "bounding-box diagonal.",
+        "Deviation: largest distance of a joint from the target surface, in % of its size.",
     )
     report.save({"finding": finding, "pavilions": rows})
 

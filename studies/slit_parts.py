@@ -11,7 +11,7 @@ parts realise, relative to the median length) as cost / 2 times the mean squared
 relative as well; both are minimised together, which gives the optimal slit lengths. Then every
 design is built of these parts, directly, without optimising anything else, and with its own
 corners, so that all deviations come from the linear parts. Deviations are distances of the joints
-from the target surfaces, in % of their bounding-box diagonals; every state is an equilibrium that
+from the target surfaces, in % of their sizes; every state is an equilibrium that
 Exudyn confirmed.
 """
 

@@ -53,7 +53,7 @@ class DesignCheck:
     """One design.
 
     failed : why it can't be simulated, None where it can: then it opens into a stable state
-    max_percent, mean_percent : its own deviation from its target, % of the box diagonal
+    max_percent, mean_percent : its own deviation from its target, % of its size
     fitted_percent : the largest deviation after `fit_input`, None where that wasn't tried
     displaced_percent : how far joints slid along the target
     utilisation : by state, the largest equivalent stress over the elastic limit; None if unknown

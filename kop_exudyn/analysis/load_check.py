@@ -205,4 +205,4 @@ def _check(
 def _apart(design: Design, a: Equilibrium, b: Equilibrium) -> float:
     """The largest distance of a joint in two states of a held design, as a share of its size."""
     x, y = (e.state.positions[design.joints] for e in (a, b))
-    return float(np.linalg.norm(x - y, axis=1).max()) / design.target.diagonal
+    return float(np.linalg.norm(x - y, axis=1).max()) / design.target.size

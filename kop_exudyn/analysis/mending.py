@@ -49,7 +49,7 @@ def about_opening(
 ) -> list[Stop]:
     """Whether the assembly opens into the state shown.
 
-    moved_percent : how far from it it ends, % of the box diagonal
+    moved_percent : how far from it it ends, % of the target's size
     given : whether it is the design as given, which no parts can help
     """
     some = "a smaller opening" if given else "more parts"

@@ -28,7 +28,7 @@ from .load_check import LoadCheck, check_load
 
 log = logging.getLogger(__name__)
 
-_FAR_AWAY = 10.0  # % of the target's box diagonal
+_FAR_AWAY = 10.0  # % of the target's size
 _SLID = 5.0  # times the deviation: what isn't on the surface any more needs no such warning
 
 
@@ -73,7 +73,7 @@ class SimulationResult:
         Deviations are distances from the surface: a grid that shears, or closes, may slide along
         it.
         """
-        return 100 * float(self.fit.displacements.max()) / self.fit.diagonal
+        return 100 * float(self.fit.displacements.max()) / self.fit.size
 
     def to_dict(self) -> dict[str, Any]:
         """As `kop simulate --json` prints it.
@@ -194,7 +194,7 @@ def simulate(design: Design, loads: LoadCase | None = None, engine: str = FAST) 
     )
     if result.displaced_percent > max(_FAR_AWAY, _SLID * fit.max_percent):
         log.warning(
-            "%s: on the surface, but joints end up to %.3g %% of its box diagonal away from their "
+            "%s: on the surface, but joints end up to %.3g %% of its size away from their "
             "places: the "
             "structure hardly resists that motion",
             design.name,

@@ -77,7 +77,7 @@ class SizedKit:
         return deviation(self.result)
 
     def row(self, cost: KitCost = KitCost()) -> dict[str, Any]:
-        """Figures for tables: deviations in % of the boxes' diagonals, None where a design
+        """Figures for tables: deviations in % of the targets' sizes, None where a design
         failed."""
         result = self.result
         pieces = counts_of(_plain(result.pieces()))

@@ -26,28 +26,28 @@ class Spread:
     """Displacements of the joints by fabrication errors, rigid motions taken out.
 
     joints : (n,) root mean square displacement of every joint, length
-    diagonal : of the target's bounding box, length
+    size : of the target, length
     """
 
     joints: np.ndarray
-    diagonal: float
+    size: float
 
     @property
     def rms_percent(self) -> float:
-        """Root mean square over all joints, % of the bounding-box diagonal."""
-        return 100 * float(np.sqrt(np.mean(self.joints**2))) / self.diagonal
+        """Root mean square over all joints, % of the target's size."""
+        return 100 * float(np.sqrt(np.mean(self.joints**2))) / self.size
 
     @property
     def worst_percent(self) -> float:
-        """Of the joint that moves most, % of the bounding-box diagonal."""
-        return 100 * float(self.joints.max()) / self.diagonal
+        """Of the joint that moves most, % of the target's size."""
+        return 100 * float(self.joints.max()) / self.size
 
 
 def predicted_spread(design: Design, evaluation: Evaluation, tolerance: Tolerance) -> Spread:
     """The joints' displacements to first order: no equilibrium is solved."""
     rows = joint_jacobian(design, evaluation) * tolerance.deviations(design)
     variance = np.sum(rows.reshape(-1, 3, rows.shape[1]) ** 2, axis=(1, 2))
-    return Spread(np.sqrt(variance), evaluation.fit.diagonal)
+    return Spread(np.sqrt(variance), evaluation.fit.size)
 
 
 def shares_by_kind(
@@ -65,13 +65,13 @@ def shares_by_kind(
     return found
 
 
-def sampled_spread(samples: Sequence[Sample], diagonal: float) -> Spread:
+def sampled_spread(samples: Sequence[Sample], size: float) -> Spread:
     """Root mean square displacements over the samples that were found. Raises SimulationFailure
     when none was."""
     found = [sample.displacements for sample in samples if sample.displacements is not None]
     if not found:
         raise SimulationFailure("no equilibrium was found for any sample of fabrication errors")
-    return Spread(np.sqrt(np.mean(np.sum(np.square(found), axis=2), axis=0)), diagonal)
+    return Spread(np.sqrt(np.mean(np.sum(np.square(found), axis=2), axis=0)), size)
 
 
 def predicted_displacements(
@@ -115,7 +115,7 @@ def robustness(
             "snapped": sum(sample.snapped for sample in found),
         }
         if found:
-            sampled = sampled_spread(samples, evaluation.fit.diagonal)
+            sampled = sampled_spread(samples, evaluation.fit.size)
             entry |= {
                 "sampled_rms_percent": sampled.rms_percent,
                 "sampled_worst_percent": sampled.worst_percent,
@@ -138,6 +138,6 @@ def robustness(
         "shares": dict(shares_by_kind(design, evaluation, tolerance)),
         "joints_percent": 100
         * predicted_spread(design, evaluation, tolerance).joints
-        / evaluation.fit.diagonal,
+        / evaluation.fit.size,
         "sizes": sizes,
     }

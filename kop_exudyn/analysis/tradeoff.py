@@ -15,7 +15,7 @@ def tradeoff_row(
 ) -> dict[str, Any]:
     """Figures of one kit, from what `find_kit` returned.
 
-    Deviations in % of the bounding-box diagonals: the largest of all designs, and the mean over
+    Deviations in % of the sizes: the largest of all designs, and the mean over
     designs of their means; energy ratios: elastic energies relative to the input designs'. None
     where a design failed.
     """

@@ -107,7 +107,7 @@ def _summary(result: dict, units: Units | None) -> str:
         "design": result["design"],
         "model": f"{result['elements']:,} elements, {result['unknowns']:,} unknowns",
         "deviation": f"max {fit['max_percent']:.3g} %, mean {fit['mean_percent']:.3g} % "
-        f"of the target's box diagonal; max {with_unit(fit['max'], 'length', units, 3)}",
+        f"of the target's size; max {with_unit(fit['max'], 'length', units, 3)}",
         "displacement": f"max {result['displaced_percent']:.3g} % from the joints' own places",
         "elastic energy": with_unit(result["elastic_energy"], "energy", units, 6),
         "stable": "yes" if result["stable"] else "no",
@@ -156,7 +156,7 @@ def _under_load(loaded: dict, units: Units | None) -> dict[str, str]:
     largest, mean = (with_unit(deflection[name], "length", units, 3) for name in ("max", "mean"))
     return {
         "load": f"{force} in all, held at {len(loaded['supports'])} joints",
-        "deflection": f"max {largest} ({deflection['max_percent']:.3g} % of the diagonal), "
+        "deflection": f"max {largest} ({deflection['max_percent']:.3g} % of the size), "
         f"mean {mean} ({deflection['mean_percent']:.3g} %)",
         "stress, loaded": _stress(loaded["strength"], units),
         "stable, loaded": "yes" if loaded["stable"] else "no",

@@ -195,7 +195,7 @@ def _in_chart(drawn: DrawnNetwork, mesh: MeshSurface) -> list[dict[str, Any]]:
     entries = []
     for curve, entry in zip(drawn.curves, drawn.entries):
         uv, apart = mesh.parameters_of(drawn.options.scale * curve.points)
-        if apart.max() > _ON_SURFACE * mesh.mesh.diagonal:
+        if apart.max() > _ON_SURFACE * mesh.mesh.size:
             raise InputError(
                 f"is up to {apart.max():.3g} off the surface: with --chart conformal curves are "
                 "drawn in space on it, in its unit and place",

@@ -149,7 +149,7 @@ def _joints(result: KitResult) -> Iterator[dict[str, Any]]:
                     "y": x[1],
                     "z": x[2],
                     "distance": distance,
-                    "distance_percent": 100 * distance / outcome.fit.diagonal,
+                    "distance_percent": 100 * distance / outcome.fit.size,
                 }
 
 

@@ -12,6 +12,7 @@ import shapely
 
 from ..errors import InputError
 from .curves import Curve
+from .extent import size_of_points
 
 # Relative to the size of all curves: an end this near to another curve lies on it; two such near
 # points are one.
@@ -38,9 +39,9 @@ class Crossing:
 
 
 def size_of(curves: Sequence[Curve]) -> float:
-    """Diagonal of the bounding box of all curves."""
+    """Size of all curves together, see `extent.size_of_points`."""
     points = np.concatenate([curve.position(curve.stations) for curve in curves])
-    return float(np.hypot(*np.ptp(points, axis=0)))
+    return size_of_points(points)
 
 
 def find_crossings(curves: Sequence[Curve]) -> list[Crossing]:

@@ -24,7 +24,7 @@ _DEGREE = 3
 _MIN_CELLS, _MAX_CELLS = 4, 40
 _VERTICES_A_CELL = 4.0
 _PENALTY = 1e-5  # of the mean data weight of a coefficient
-_MAX_DEVIATION = 0.01  # of the bounding box's diagonal
+_MAX_DEVIATION = 0.01  # of its size
 
 
 class MeshSurface(Surface):
@@ -83,7 +83,7 @@ class MeshSurface(Surface):
     def contains(self, uv: np.ndarray) -> np.ndarray:
         uv = np.asarray(uv, float)
         found = self._flat.closest(np.column_stack([uv, np.zeros(len(uv))]))
-        return found.squared_distances <= (1e-6 * self._flat.diagonal) ** 2
+        return found.squared_distances <= (1e-6 * self._flat.size) ** 2
 
     def derivatives(self, uv: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         uv = np.asarray(uv, float)
@@ -127,10 +127,10 @@ class MeshSurface(Surface):
         matrix = rows.T @ rows + weight * sum(bend.T @ bend for bend in bends)
         solution = spsolve(sp.csc_array(matrix), rows.T @ self.mesh.vertices)
         self._coefficients = np.asarray(solution).reshape(n, m, 3)
-        if not self.deviation <= _MAX_DEVIATION * self.mesh.diagonal:
+        if not self.deviation <= _MAX_DEVIATION * self.mesh.size:
             raise InputError(
                 f"the mesh is too rough to be followed by a smooth surface (off by "
-                f"{100 * self.deviation / self.mesh.diagonal:.1f} % of its size)",
+                f"{100 * self.deviation / self.mesh.size:.1f} % of its size)",
                 field="surface",
             )
 

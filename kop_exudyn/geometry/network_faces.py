@@ -10,6 +10,7 @@ from .network import CurveNetwork
 # Faces with more joints are openings of the structure, not part of its surface.
 MOST_CORNERS = 8
 _SAMPLES = 8
+_EQUAL = 1e-9  # cuts that differ by less are equally short
 
 
 def faces_of(network: CurveNetwork) -> list[list[int]]:
@@ -84,10 +85,12 @@ def _ears(face: list[int], joints: np.ndarray) -> list[tuple[int, int, int]]:
     rest = list(face)
     triangles: list[tuple[int, int, int]] = []
     while len(rest) > 3:
-        ear = min((e for k in range(len(rest)) if (e := _ear(rest, k, joints))), default=None)
-        if ear is None:
+        ears = [e for k in range(len(rest)) if (e := _ear(rest, k, joints))]
+        if not ears:
             return triangles
-        k = ear[1]
+        # of equally short cuts the first, whatever rounding makes of a net that is turned
+        shortest = min(ears)[0] * (1 + _EQUAL)
+        k = next(k for length, k in ears if length <= shortest)
         triangles.append((rest[k - 1], rest[k], rest[(k + 1) % len(rest)]))
         del rest[k]
     # two curves that cross twice in a row enclose a lens

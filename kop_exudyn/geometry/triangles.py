@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from .extent import size_of_points
 
 # Barycentric coordinates below this are zero: the closest point lies on an edge or a vertex.
 _ON_EDGE = 1e-10
@@ -75,10 +76,10 @@ class TriangleSurface:
         self.normals = _unit_normals(self.vertices, self.faces)
 
     @cached_property
-    def diagonal(self) -> float:
-        """Length of the bounding box's diagonal."""
+    def size(self) -> float:
+        """See `extent.size_of_points`."""
         used = self.vertices[np.unique(self.faces)]
-        return float(np.linalg.norm(np.ptp(used, axis=0)))
+        return size_of_points(used)
 
     def closest(self, points: np.ndarray) -> Closest:
         """Closest points of points (n, 3)."""
@@ -124,7 +125,7 @@ class TriangleSurface:
         height = np.einsum("nk,nk->n", offset, normals)
         aside = np.linalg.norm(offset - height[:, None] * normals, axis=1)
         others = np.flatnonzero(
-            aside > _NORMAL_ABSOLUTE * self.diagonal + _NORMAL_RELATIVE * np.abs(height)
+            aside > _NORMAL_ABSOLUTE * self.size + _NORMAL_RELATIVE * np.abs(height)
         )
         if len(others):
             corners = self.vertices[self.faces[faces[others]]]

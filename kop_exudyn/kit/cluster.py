@@ -24,6 +24,7 @@ from .kinds import Bounds, part_kind
 from .parts import Assignment, Kit
 
 _MAX_ITERATIONS = 300
+_EQUAL = 1e-10
 _GAIN = 1e-9  # relative; a swap that gains less might be undone by the next one
 
 
@@ -59,17 +60,35 @@ def cluster(
     without elements, empty bounds.
     """
     elements = collect(groups, q, penalties=penalties)
+    rounded = collect(groups, _rounded(groups, q), penalties=penalties)
     _check_request(elements, parts)
     for name in bounds or ():
         part_kind(name)  # a misspelt kind would leave its parts unbounded
     found, labels, energy = {}, {}, {}
     for name, e in elements.items():
-        limits = e.kind.bounds(bounds)
-        canonical = e.kind.canonical(_best_found(e, parts[name], limits, max(restarts, 1), seed))
+        limits, near = e.kind.bounds(bounds), rounded[name]
+        best = _best_found(near, parts[name], limits, max(restarts, 1), seed)
+        if e.exact:
+            best = best_parts(e, best, near.nearest(best), *limits)
+        canonical = e.kind.canonical(best)
         found[name] = canonical[np.lexsort(canonical.T[::-1])]
-        labels[name] = e.nearest(found[name])
+        labels[name] = _measured(e, found[name], near.nearest(found[name]))
         energy[name] = e.energy(found[name], labels[name])
     return Clustering(Kit(found), to_assignment(groups, len(q), elements, labels), energy)
+
+
+def _rounded(groups: Sequence[ElementGroup], q: np.ndarray) -> np.ndarray:
+    """Parameters q (n_q,) by which elements and parts are compared: to 1e-10 of the largest of
+    their kind. Symmetric designs have equal elements, of which rounding would choose, and choose
+    others when the design is moved or turned."""
+    found = np.array(q, float)
+    for kind in {group.kind for group in groups}:
+        own = np.concatenate([g.indices.ravel() for g in groups if g.kind == kind])
+        largest = np.abs(found[own]).max(initial=0.0)
+        if np.isfinite(largest) and largest > 0:
+            step = 2.0 ** np.floor(np.log2(_EQUAL * largest))
+            found[own] = np.round(found[own] / step) * step
+    return found
 
 
 def _best_found(

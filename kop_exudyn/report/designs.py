@@ -31,8 +31,7 @@ class DrawnState:
 
     title : what it is called, as "direct"
     chains : list of (k, 3), the rods' nodes in order
-    joints : (n, 3) ; deviation_percent : (n,) their distance to the target, % of its bounding-box
-        diagonal
+    joints : (n, 3) ; deviation_percent : (n,) their distance to the target, % of its size
     failed : why there is no such state; the rest is empty then
     """
 
@@ -215,5 +214,5 @@ def _colour_bar(figure: Figure, norm: Normalize, quantity: str, beyond: bool) ->
     bar = figure.colorbar(
         ScalarMappable(norm, deviation_colours()), cax=place, extend="max" if beyond else "neither"
     )
-    bar.set_label(f"{quantity}, % of box diagonal")
+    bar.set_label(f"{quantity}, % of size")
     bar.outline.set_visible(False)

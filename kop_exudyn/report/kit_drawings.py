@@ -53,7 +53,7 @@ def drawn_state(design: Design, outcome: Evaluation | SimulationFailure, title: 
         title,
         [placement.apply(line) for line in design.scene(role).polylines(state)],
         placement.apply(state.positions[design.joints]),
-        100 * outcome.fit.distances / outcome.fit.diagonal,
+        100 * outcome.fit.distances / outcome.fit.size,
     )
 
 

@@ -40,7 +40,7 @@ from .viewer_scenes import kit_scene
 
 _LEGEND = (
     "Opens within: how far from the state shown the design ends that its assembly opens into, % of "
-    "the box diagonal. Utilisation: the largest equivalent stress over the elastic limit in all "
+    "the target's size. Utilisation: the largest equivalent stress over the elastic limit in all "
     "states. Softest mode: its eigenvalue in the deployed state over the input design's. Spread: "
     "root mean square displacement of the joint that moves most under the workshop's errors. "
     "Snapped: of sets of such errors. A dash: not known."

@@ -30,7 +30,7 @@ from .tradeoff_drawing import draw_tradeoff
 from .verdicts import give_verdicts
 
 _EXPLAINED = (
-    "Deviations of the designs as they open, in % of their boxes' diagonals: the largest of all "
+    "Deviations of the designs as they open, in % of their targets' sizes: the largest of all "
     "designs, and the mean over the designs of their means. Pieces: as many of each part as the "
     "design that needs most of it. J: the objective. From: the kit whose parts were split or "
     "merged. A dash: a design could not be built."

@@ -269,7 +269,7 @@
       bar.style.background = `linear-gradient(90deg, ${scene.scale.map(css).join(",")})`;
       ticks.className = "ticks";
       for (let k = 0; k <= 4; k++) ticks.append(Object.assign(document.createElement("span"), {textContent: `${k === 4 && beyond ? "≥ " : ""}${Number((limit * k / 4).toPrecision(3))}`}));
-      const title = {deviation: "distance from the target, % of its box diagonal", utilisation: "stress as a share of the elastic limit; above 1 it yields"}[chosen.colour];
+      const title = {deviation: "distance from the target, % of its size", utilisation: "stress as a share of the elastic limit; above 1 it yields"}[chosen.colour];
       box.append(Object.assign(document.createElement("p"), {textContent: title}), bar, ticks);
       if (!shown().some(d => d.drawn?.[chosen.colour])) box.append(Object.assign(document.createElement("p"), {className: "quiet", textContent: "not known for this stage"}));
     }

@@ -72,7 +72,7 @@ class ViewerState:
     positions (M, 3), rotations (M, 3, 3) : of the rings, x along the rod, in the target's
         coordinates where `placed`
     joints (j, 3), corners (m, 3) : marked points
-    deviation (M,) : distance from the target, in % of its box diagonal; utilisation (M,) : of the
+    deviation (M,) : distance from the target, in % of its size; utilisation (M,) : of the
         elastic limit
     opening : rad, where states of one stage and role form a path; final : whether it is the one
         that counts

@@ -266,7 +266,7 @@ class _Drawing:
             )
             R = placement.rotation @ R
             distances = np.sqrt(self.surface.closest(x).squared_distances)
-            deviation = 100 * distances[nodes] / self.design.target.diagonal
+            deviation = 100 * distances[nodes] / self.design.target.size
         strength = design_strength(self.design, {role: equilibrium})[role]
         largest = strength.largest
         utilisation = None if largest is None else _ring_values(scene, strength.utilisation)

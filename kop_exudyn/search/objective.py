@@ -2,7 +2,7 @@
 
 F(q) = beta T / l0^2 + gamma sum_roles E / E0 + ..., with T the target fitting of the deployed
 joints at the best rigid placement, E the elastic energies (deployed, and assembled where the class
-has such a state), l0 the target's bounding-box diagonal and E0 the input design's deployed energy:
+has such a state), l0 the target's size and E0 the input design's deployed energy:
 every term is divided by its own scale, so F doesn't change with units. The terms are the modules of
 `terms/`.
 """
@@ -305,7 +305,7 @@ class DesignObjective:
             e.fit.placement.apply(e.equilibria[role].state.positions[self.design.joints])
             for e in (a, b)
         )
-        return float(np.linalg.norm(x - y, axis=1).max()) / a.fit.diagonal
+        return float(np.linalg.norm(x - y, axis=1).max()) / a.fit.size
 
     def derivatives(self, evaluation: Evaluation, hessian: bool = True) -> DesignDerivatives:
         """Confirm the evaluation's states with Exudyn, then differentiate F at Exudyn's states."""

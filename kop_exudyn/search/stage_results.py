@@ -104,7 +104,7 @@ class StageResult:
 
 
 def find_jump(
-    design: Any, start: Evaluation, path: Sequence[Evaluation], diagonal: float
+    design: Any, start: Evaluation, path: Sequence[Evaluation], size: float
 ) -> Jump | None:
     """The largest snap on a path of equal parameter steps, or None: joints that move far more in
     one step."""
@@ -112,7 +112,7 @@ def find_jump(
     positions = [e.equilibria[role].state.positions[design.joints] for e in (start, *path)]
     moves = (
         np.array([np.linalg.norm(b - a, axis=1).max() for a, b in zip(positions, positions[1:])])
-        / diagonal
+        / size
     )
     worst = int(np.argmax(moves))
     if moves[worst] > _JUMP_SHARE and moves[worst] > _JUMP_FACTOR * np.median(moves):
@@ -130,7 +130,7 @@ def distance(design: Design, a: Evaluation, b: Evaluation) -> float:
     joints = [
         e.fit.placement.apply(e.equilibria[role].state.positions[design.joints]) for e in (a, b)
     ]
-    return float(np.linalg.norm(joints[0] - joints[1], axis=1).max()) / a.fit.diagonal
+    return float(np.linalg.norm(joints[0] - joints[1], axis=1).max()) / a.fit.size
 
 
 def combined(results: Sequence[StageResult], dataset: Dataset) -> StageResult:

@@ -489,7 +489,7 @@ class Stages:
                 designs.append(path)
                 continue
             jump = find_jump(
-                self.dataset.designs[n], start[n], path, self.dataset.references[n].target.diagonal
+                self.dataset.designs[n], start[n], path, self.dataset.references[n].target.size
             )
             jumps += [jump] if jump is not None else []
             designs.append(path[-1])

@@ -43,13 +43,13 @@ class Target:
 
     vertices (V, 3), faces (F, 3) : the target surface
     positions (n_joints, 3) : where the joints were in the input design's deployed state
-    diagonal : length of the surface's bounding-box diagonal, l0
+    size : of the surface, l0, to which percentages refer: see `geometry.extent.size_of_points`
     """
 
     vertices: np.ndarray
     faces: np.ndarray
     positions: np.ndarray
-    diagonal: float
+    size: float
 
 
 @dataclass(frozen=True)

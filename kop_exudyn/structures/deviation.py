@@ -2,8 +2,7 @@
 
 Joints may all lie on the target while the corners between them stand off it: what is built is both.
 Distances are from the target's surface, at the placement in space that fits the joints best. They
-are given in the design's unit of length and in percent of the diagonal of the target's bounding
-box.
+are given in the design's unit of length and in percent of the target's size.
 """
 
 from __future__ import annotations
@@ -27,19 +26,19 @@ class Deviation:
     joints (n,) : of the joints
     pieces (m,) : of all points that the rods are followed at, corners and joints included; the
         joints alone for designs whose rods lie beside the target
-    diagonal : of the target's bounding box
+    size : of the target
     """
 
     joints: np.ndarray
     pieces: np.ndarray
-    diagonal: float
+    size: float
 
     def to_dict(self) -> dict[str, float]:
-        """Largest and mean distances, in units of length and in % of the diagonal, as results have
+        """Largest and mean distances, in units of length and in % of the size, as results have
         them."""
         found = {"max": self.joints.max(), "mean": self.joints.mean()}
         found |= {"pieces_max": self.pieces.max(), "pieces_mean": self.pieces.mean()}
-        percent = {f"{name}_percent": 100 * d / self.diagonal for name, d in found.items()}
+        percent = {f"{name}_percent": 100 * d / self.size for name, d in found.items()}
         return {name: float(value) for name, value in (percent | found).items()}
 
 
@@ -55,7 +54,7 @@ def deviation(design: Design, target: Target, fit: FitResult, state: State) -> D
             fit.placement.apply(points)
         )
         distances = np.concatenate([distances, np.sqrt(closest.squared_distances)])
-    return Deviation(fit.distances, distances, fit.diagonal)
+    return Deviation(fit.distances, distances, fit.size)
 
 
 def rod_points(design: Design, state: State) -> np.ndarray:

@@ -53,7 +53,7 @@ class FitResult:
     placement : the best one
     distances : (n,) of the placed joints from the surface
     displacements : (n,) of the placed joints from their own places in the target
-    diagonal : length that percentages refer to
+    size : of the target, which percentages refer to
     blocks : (n, 3, 3) square root of the Hessian of T in each placed joint
     motions : (3n, r) orthonormal basis of the weighted residual rows' change by rigid motions
     """
@@ -63,19 +63,19 @@ class FitResult:
     placement: Placement
     distances: np.ndarray
     displacements: np.ndarray
-    diagonal: float
+    size: float
     blocks: np.ndarray
     motions: np.ndarray
 
     @property
     def max_percent(self) -> float:
-        """Largest distance from the surface, % of the target's bounding-box diagonal."""
-        return 100 * float(self.distances.max()) / self.diagonal
+        """Largest distance from the surface, % of the target's size."""
+        return 100 * float(self.distances.max()) / self.size
 
     @property
     def mean_percent(self) -> float:
-        """Mean distance from the surface, % of the target's bounding-box diagonal."""
-        return 100 * float(self.distances.mean()) / self.diagonal
+        """Mean distance from the surface, % of the target's size."""
+        return 100 * float(self.distances.mean()) / self.size
 
     def weighted_rows(self, jacobian: np.ndarray) -> np.ndarray:
         """R J (3n, m) for J = dx/dq (3n, m): the Gauss-Newton Hessian of T in q is (R J)^T (R
@@ -125,7 +125,7 @@ class TargetFitting:
                 field="target.positions",
                 value=self.positions.shape,
             )
-        self.diagonal, self.share = float(target.diagonal), float(share)
+        self.size, self.share = float(target.size), float(share)
         self.weights = _normalised(weights, len(self.positions))
 
     def __call__(self, x: np.ndarray, placement: Placement | None = None) -> FitResult:
@@ -183,7 +183,7 @@ class TargetFitting:
         and of shifts."""
         centre = self.weights @ y
         arms = y - centre
-        size = float(np.sqrt(self.weights @ np.sum(arms**2, axis=1))) or self.diagonal
+        size = float(np.sqrt(self.weights @ np.sum(arms**2, axis=1))) or self.size
         turns = np.cross(np.eye(3)[None], arms[:, None]) / size  # (n, axis, 3)
         shifts = np.broadcast_to(np.eye(3), turns.shape)
         return (
@@ -230,7 +230,7 @@ class TargetFitting:
             placement,
             np.sqrt(closest.squared_distances),
             np.linalg.norm(y - self.positions, axis=1),
-            self.diagonal,
+            self.size,
             blocks,
             basis,
         )

@@ -38,7 +38,7 @@ class LoadedState:
     supports : (k,) joints that are held
     total_force : (3,) sum of all loads
     displacements : (N, 3) of the rods' nodes against the unloaded state
-    diagonal : of the target's bounding box, to which percentages refer
+    size : of the target, to which percentages refer
     equilibrium, confirmation : of the loaded scene; the state is Exudyn's
     """
 
@@ -46,7 +46,7 @@ class LoadedState:
     supports: np.ndarray
     total_force: np.ndarray
     displacements: np.ndarray
-    diagonal: float
+    size: float
     equilibrium: Equilibrium
     confirmation: Confirmation
     strength: Strength
@@ -59,7 +59,7 @@ class LoadedState:
 
     def to_dict(self) -> dict[str, Any]:
         """As `kop simulate --json` has it: lengths in the design's units, percentages of the
-        target's diagonal."""
+        target's size."""
         d, case = self.deflections, self.case
         return {
             "gravity": None if case.gravity is None else case.gravity.tolist(),
@@ -68,8 +68,8 @@ class LoadedState:
             "deflection": {
                 "max": float(d.max()),
                 "mean": float(d.mean()),
-                "max_percent": 100 * float(d.max()) / self.diagonal,
-                "mean_percent": 100 * float(d.mean()) / self.diagonal,
+                "max_percent": 100 * float(d.max()) / self.size,
+                "mean_percent": 100 * float(d.mean()) / self.size,
             },
             "elastic_energy": self.equilibrium.elastic_energy,
             "stable": self.equilibrium.stable,
@@ -115,7 +115,7 @@ def loaded_state(
         supports,
         _total_force(scene, unloaded),
         moved,
-        design.target.diagonal,
+        design.target.size,
         found,
         confirmation,
         rod_strength(scene, found, materials_of(design)),

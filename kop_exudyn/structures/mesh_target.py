@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..geometry.extent import size_of_points
 from ..geometry.mesh_files import read_mesh
 from ..geometry.triangles import TriangleSurface
 from .base import Target
@@ -50,7 +51,7 @@ def target_on_mesh(surface: TriangleSurface, joints: np.ndarray) -> Target:
     """
     from scipy.spatial.transform import Rotation
 
-    size, laid = float(np.linalg.norm(np.ptp(joints, axis=0))), joints
+    size, laid = size_of_points(joints), joints
     for _ in range(_MAX_ITERATIONS):
         goal, before = surface.closest(laid).points, laid
         turn = Rotation.align_vectors(goal - goal.mean(axis=0), joints - joints.mean(axis=0))[0]
@@ -58,6 +59,4 @@ def target_on_mesh(surface: TriangleSurface, joints: np.ndarray) -> Target:
         if np.abs(laid - before).max() <= _SETTLED * size:
             break
     positions = surface.closest(laid).points
-    return Target(
-        surface.vertices, surface.faces, positions, float(np.linalg.norm(np.ptp(positions, axis=0)))
-    )
+    return Target(surface.vertices, surface.faces, positions, size_of_points(positions))

@@ -55,7 +55,7 @@ class Way:
     stations : on the way, in order
     deployed : where the way ends
     joints : (n_joints,) bodies by which states are compared
-    diagonal : size to which distances are relative
+    size : to which distances are relative
 
     The methods' `systems` are the design's workspaces, by the names of scenes.
     """
@@ -64,7 +64,7 @@ class Way:
     stations: tuple[Station, ...]
     deployed: Station
     joints: np.ndarray
-    diagonal: float
+    size: float
 
     def opened(
         self,
@@ -166,7 +166,7 @@ class Way:
         x, y = (e.state.positions[self.joints] for e in (a, b))
         x, y = x - x.mean(axis=0), y - y.mean(axis=0)
         turn, _ = Rotation.align_vectors(y, x)
-        return float(np.linalg.norm(turn.apply(x) - y, axis=1).max()) / self.diagonal
+        return float(np.linalg.norm(turn.apply(x) - y, axis=1).max()) / self.size
 
 
 def _stepped(

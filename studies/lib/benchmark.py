@@ -72,13 +72,13 @@ def deployments(
     Error: largest distance of a joint from the fine solution, % of the target's bounding box.
     """
     design = prepare(fine)
-    role, diagonal = design.fitted_role.name, design.target.diagonal
+    role, size = design.fitted_role.name, design.target.size
     exact = _joints(design, prepare(fine).deploy()[role])
     rows = []
     for n in refinements:
         timing = timed(lambda own: own.deploy()[role], runs, partial(prepare, n))
         own = prepare(n)
-        error = 100 * np.linalg.norm(_joints(own, timing.value) - exact, axis=1).max() / diagonal
+        error = 100 * np.linalg.norm(_joints(own, timing.value) - exact, axis=1).max() / size
         rows.append(
             {
                 "case": case,

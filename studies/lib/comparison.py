@@ -98,7 +98,7 @@ def draw_comparison(rows: Sequence[Row]) -> Figure:
             xscale="log",
             xlim=(low, 1.15 * high),
             ylim=(len(rows) - 0.4, -0.6),
-            xlabel="largest deviation of the joints, % of the bounding-box diagonal",
+            xlabel="largest deviation of the joints, % of the size",
         )
         ax.set_yticks(range(len(rows)), [row["design"] for row in rows])
         ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

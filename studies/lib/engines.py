@@ -88,7 +88,7 @@ def _loaded(design: Design, found: dict[str, Any], seed: int) -> Row:
     rng = np.random.default_rng(seed)
     joints = np.arange(0, len(design.joints), 10)
     role = design.fitted_role.name
-    size = design.target.diagonal
+    size = design.target.size
     # such that the rods' own energy is of the order of the forces' work over 0.1 % of the size
     force = found[role].elastic_energy / (1e-1 * size * len(joints))
     case = LoadCase(joints=joints, forces=force * rng.uniform(-1, 1, (len(joints), 3)))
@@ -111,10 +111,10 @@ def _loaded(design: Design, found: dict[str, Any], seed: int) -> Row:
 def as_it_comes(file: Path, fine: int, runs: int) -> dict[str, Any]:
     """The final state of one design from its start, by Exudyn's static solver as it comes, by both
     engines too; errors of each one's own joints against the design with finer elements, % of the
-    target's diagonal."""
+    target's size."""
     library()
     design, exact = load_design(file), _finer(file, fine)
-    role, diagonal = design.fitted_role, design.target.diagonal
+    role, size = design.fitted_role, design.target.size
     scene, q, system = design.scene(role.name), design.parameters, design.systems[role.name]
     start, opening = _start(design)
     rows = []
@@ -122,7 +122,7 @@ def as_it_comes(file: Path, fine: int, runs: int) -> dict[str, Any]:
     def row(way: str, seconds: list[float], iterations: Any, joints: Any, settings: str) -> None:
         error = None
         if joints is not None:
-            error = 100 * float(np.linalg.norm(joints - exact, axis=1).max()) / diagonal
+            error = 100 * float(np.linalg.norm(joints - exact, axis=1).max()) / size
         rows.append(
             {
                 "design": design.name,

@@ -73,7 +73,7 @@ def draw_agreement(classes: Mapping[str, Sequence[Found]]) -> Figure:
                 ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
                 ax.xaxis.set_major_locator(LogLocator(numticks=9))
                 ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        panels[0, 0].set_ylabel("rms displacement of the joints,\n% of the box diagonal")
+        panels[0, 0].set_ylabel("rms displacement of the joints,\n% of the size")
         panels[1, 0].set_ylabel("missed by the prediction,\nshare of the displacement")
     return figure
 

@@ -24,9 +24,9 @@ class WatchedPath:
 
     start : relaxed; states : (steps,) after equal steps, the last one at the parts
     moves_percent : (steps,) how far the joint that moves most goes in each step, % of the
-        bounding-box diagonal
+        size of the target
     energies : (steps + 1,) elastic, relative to the input design's, the start's first
-    deviations_percent : (steps + 1,) largest distance of a joint from the target, % of the diagonal
+    deviations_percent : (steps + 1,) largest distance of a joint from the target, % of its size
     jump : the snap, or None
     """
 
@@ -74,7 +74,7 @@ def watch_one(
 def _watched(
     design: Design, reference, start: Evaluation, path: Sequence[Evaluation]
 ) -> WatchedPath:
-    role, diagonal = design.fitted_role.name, reference.target.diagonal
+    role, size = design.fitted_role.name, reference.target.size
     every = [start, *path]
     joints = np.stack([e.equilibria[role].state.positions[design.joints] for e in every])
     moves = np.linalg.norm(np.diff(joints, axis=0), axis=2).max(axis=1)
@@ -82,8 +82,8 @@ def _watched(
     return WatchedPath(
         start,
         list(path),
-        100 * moves / diagonal,
+        100 * moves / size,
         energies,
         np.array([e.fit.max_percent for e in every]),
-        find_jump(design, start, path, diagonal),
+        find_jump(design, start, path, size),
     )

@@ -60,7 +60,7 @@ def test_exudyn_finds_the_state_under_loads(repository):
     )
     fast, found = (kop.simulate(design, loads, engine=name).loaded for name in ("fast", "exudyn"))
     apart = np.abs(found.joints - fast.joints).max()
-    assert apart < _SAME * design.target.diagonal
+    assert apart < _SAME * design.target.size
     assert found.deflections.max() == pytest.approx(fast.deflections.max(), rel=1e-6)
 
 

@@ -85,7 +85,7 @@ class TestTargets:
         data = json.loads(out.read_text())
         assert data["target"] == {"file": "dome.obj", "scale": 0.001}
         target = load_design(out).target_mesh
-        assert target.diagonal == pytest.approx(np.linalg.norm([4.0, 4.0, 0.64]), rel=1e-6)
+        assert np.ptp(target.vertices, axis=0) == pytest.approx([4.0, 4.0, 0.64], rel=1e-6)
 
     @pytest.mark.parametrize("name", ["plane_xz.dxf", "plane_yz.dxf", "plane_tilted_far_away.dxf"])
     def test_it_is_laid_into_the_drawings_plane(self, name, corpus, tmp_path, capsys):

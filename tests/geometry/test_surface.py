@@ -113,9 +113,9 @@ def test_flat_inner_edges_and_points_on_the_surface_count_as_faces():
     )
 
 
-def test_diagonal_ignores_unused_vertices():
+def test_size_ignores_unused_vertices():
     surface = TriangleSurface([[0, 0, 0], [3, 0, 0], [0, 4, 0], [99, 0, 0]], [[0, 1, 2]])
-    assert surface.diagonal == 5
+    assert surface.size == pytest.approx(np.sqrt(3) * (3 + 4 + 5) / 4)
 
 
 def test_survives_pickling_with_its_tree_built():

@@ -83,7 +83,7 @@ class TestDesigns:
         figure = draw_designs(rows, 1.5, "displacement")
         for title, ax in zip("abcd", figure.axes):
             assert title in [text.get_text() for text in ax.texts] and not ax.get_title()
-        assert "displacement, % of box diagonal" in [ax.get_ylabel() for ax in figure.axes]
+        assert "displacement, % of size" in [ax.get_ylabel() for ax in figure.axes]
 
     def test_flat_and_failed_designs_are_drawn(self):
         flat = DrawnDesign("flat", [drawn("rest", 0.0, 0.0)])

@@ -13,6 +13,7 @@ from kop_exudyn.analysis.simulation import simulate
 from kop_exudyn.equilibrium.exudyn_confirm import confirm
 from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.errors import InputError
+from kop_exudyn.geometry.extent import size_of_points
 from kop_exudyn.search.input_fit import fit_input
 from kop_exudyn.search.objective import DesignObjective, Weights
 from kop_exudyn.structures.base import design_from_dict
@@ -160,7 +161,7 @@ def test_the_target_passes_through_the_smooth_designs_joints(shell):
     target = shell.target
     at_joints = TriangleSurface(target.vertices, target.faces).closest(target.positions)
     assert at_joints.squared_distances.max() < 1e-24
-    assert target.diagonal == pytest.approx(np.linalg.norm(np.ptp(target.vertices, axis=0)))
+    assert target.size == pytest.approx(size_of_points(target.vertices))
 
 
 def test_an_imperfection_unfolds_the_buckling_of_the_rest_state(conformal):
@@ -263,13 +264,13 @@ class TestMeshTargets:
     def test_its_own_target_elsewhere_is_the_same_target(self, conformal, shell, tmp_path):
         turn = Rotation.from_rotvec([0.05, -0.1, 0.2])
         own = shell.target
-        write_mesh(tmp_path / "moved.obj", turn.apply(own.vertices) + 0.1 * own.diagonal, own.faces)
+        write_mesh(tmp_path / "moved.obj", turn.apply(own.vertices) + 0.1 * own.size, own.faces)
         design = design_from_dict(
             small(conformal) | {"target": {"file": "moved.obj"}}, str(tmp_path / "shell.json")
         )
-        places = turn.apply(own.positions) + 0.1 * own.diagonal
+        places = turn.apply(own.positions) + 0.1 * own.size
         # slid along the surface a little
-        assert np.abs(design.target.positions - places).max() < 0.02 * own.diagonal
+        assert np.abs(design.target.positions - places).max() < 0.02 * own.size
         mine, meshs = simulate(shell), simulate(design)
         assert meshs.fit.max_percent < mine.fit.max_percent + 0.1
 

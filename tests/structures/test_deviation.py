@@ -42,7 +42,7 @@ def test_corners_stand_off_where_tangents_meet():
     height = R * (1 / np.cos(0.12) - 1)
     assert found.pieces.max() == pytest.approx(height, rel=0.05)
     figures = found.to_dict()
-    assert figures["pieces_max_percent"] == 100 * found.pieces.max() / fit.diagonal
+    assert figures["pieces_max_percent"] == 100 * found.pieces.max() / fit.size
     assert figures["max"] == fit.distances.max()
 
 

@@ -167,7 +167,7 @@ def test_weights_move_the_placement():
 @pytest.mark.parametrize("share", [0.0, 0.1])
 def test_collinear_joints(share):
     line = Target(
-        TARGET.vertices, TARGET.faces, np.outer(np.linspace(-1, 1, 4), [1, 0, 0]), TARGET.diagonal
+        TARGET.vertices, TARGET.faces, np.outer(np.linspace(-1, 1, 4), [1, 0, 0]), TARGET.size
     )
     fit = TargetFitting(line, share)(np.outer(np.linspace(-1, 1.1, 4), [0, 1, 0]))
     assert np.isfinite(fit.gradient).all() and np.isfinite(fit.gauss_newton()).all()

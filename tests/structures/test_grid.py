@@ -17,6 +17,7 @@ from kop_exudyn.equilibrium.exudyn_confirm import confirm
 from kop_exudyn.equilibrium.newton import NewtonOptions, solve
 from kop_exudyn.equilibrium.sensitivities import Sensitivities
 from kop_exudyn.errors import InputError, SimulationFailure
+from kop_exudyn.geometry.extent import size_of_points
 from kop_exudyn.io.datasets import load_designs
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.search.objective import DesignObjective, Weights
@@ -306,7 +307,7 @@ def test_the_target_is_the_design_surface_around_the_grid(saddle):
     assert (target.vertices[:, :2].min(axis=0) < -0.5).all() and (
         target.vertices[:, :2].max(axis=0) > 0.5
     ).all()
-    assert target.diagonal == pytest.approx(np.linalg.norm(np.ptp(target.positions, axis=0)))
+    assert target.size == pytest.approx(size_of_points(target.positions))
 
 
 def test_designs_travel_to_other_processes(saddle, deployed):

@@ -32,11 +32,11 @@ def test_a_shell_opens_into_its_target(shell, states):
         np.linspace(shell.roles[1].opening, shell.roles[0].opening, len(states) + 1)[1:-1]
     )
     heights = [np.ptp(state.state.positions[shell.joints, 2]) for state in states]
-    assert heights[0] < 1e-9 < 0.01 * shell.target.diagonal < heights[-1]
+    assert heights[0] < 1e-9 < 0.01 * shell.target.size < heights[-1]
     lifted = [station.lifted is not None for station in (*way.stations, way.deployed)]
     assert any(lifted) and heights[lifted.index(True)] > 1e-4 * shell.target.diagonal
     joints = states[-1].state.positions[shell.joints]
-    assert np.abs(joints - shell.target.positions).max() < 0.05 * shell.target.diagonal
+    assert np.abs(joints - shell.target.positions).max() < 0.05 * shell.target.size
 
 
 def test_steps_that_leave_a_saddle_are_taken_in_parts(shell, states):
@@ -71,7 +71,7 @@ def test_it_rises_to_the_side_that_is_asked_for(repository, shell, states):
     other.side = -shell.side
     mirrored = opened(other, other.parameters)[-1]
     z, w = (s.state.positions[shell.joints, 2] for s in (states[-1], mirrored))
-    assert np.allclose(z, -w, atol=1e-6 * shell.target.diagonal)
+    assert np.allclose(z, -w, atol=1e-6 * shell.target.size)
 
 
 def test_it_is_lifted_until_it_stays_up(shell, states):

@@ -32,9 +32,9 @@ def test_targets_are_whole_and_pass_through_the_joints(folder):
     for design in designs:
         target = design.target
         # shells, not plane nets
-        assert np.ptp(target.positions[:, 2]) > 0.07 * target.diagonal
+        assert np.ptp(target.positions[:, 2]) > 0.07 * target.size
         edges = target.vertices[target.faces] - target.vertices[np.roll(target.faces, 1, axis=1)]
-        assert np.linalg.norm(edges, axis=2).max() < 0.2 * target.diagonal
+        assert np.linalg.norm(edges, axis=2).max() < 0.2 * target.size
         nearest = np.linalg.norm(target.vertices[None] - target.positions[:, None], axis=2).min(
             axis=1
         )

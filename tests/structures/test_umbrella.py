@@ -16,6 +16,7 @@ from kop_exudyn.exchange.meshes import sweep
 from kop_exudyn.fabrication.pieces import DesignPieces
 from kop_exudyn.fabrication.placement import PlacedPieces
 from kop_exudyn.files.documents import check_schema
+from kop_exudyn.geometry.extent import size_of_points
 from kop_exudyn.report.viewer_scenes import design_scene
 from kop_exudyn.structures.base import design_from_dict
 from kop_exudyn.structures.fitting import best_placement
@@ -175,7 +176,7 @@ def test_a_mesh_without_a_target_is_compared_with_its_own_deployed_shape(design)
     target = design.target
     assert np.allclose(target.positions, design.deployed.state.positions[design.joints])
     assert len(target.faces) == 6 and len(target.vertices) == 12
-    assert target.diagonal == pytest.approx(np.linalg.norm(np.ptp(target.vertices, axis=0)))
+    assert target.size == pytest.approx(size_of_points(target.vertices))
 
 
 def test_swapping_top_and_bottom_turns_the_structure_upside_down(design, deployed):

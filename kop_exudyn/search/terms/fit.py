@@ -13,8 +13,7 @@ from .base import Term, register_term
 
 @register_term
 class Fit(Term):
-    """Target fitting at the best rigid placement, over the square of the target's bounding-box
-    diagonal."""
+    """Target fitting at the best rigid placement, over the square of the target's size."""
 
     name = "fit"
 
@@ -25,11 +24,11 @@ class Fit(Term):
         return self.name
 
     def value(self, role: Role, equilibrium: Equilibrium, fit: FitResult) -> float:
-        return fit.value / self.reference.target.diagonal**2
+        return fit.value / self.reference.target.size**2
 
     def gradient(self, role: Role, sensitivities: Sensitivities, fit: FitResult) -> np.ndarray:
         dofs = (6 * self.design.joints[:, None] + np.arange(3)).ravel()
-        return sensitivities.adjoint(dofs, fit.gradient.ravel()) / self.reference.target.diagonal**2
+        return sensitivities.adjoint(dofs, fit.gradient.ravel()) / self.reference.target.size**2
 
     def model(
         self, role: Role, sensitivities: Sensitivities, fit: FitResult
@@ -38,5 +37,5 @@ class Fit(Term):
         are not."""
         positions_q = sensitivities.positions(self.design.joints)
         rows = fit.weighted_rows(positions_q)
-        scale = 1 / self.reference.target.diagonal**2
+        scale = 1 / self.reference.target.size**2
         return scale * (positions_q.T @ fit.gradient.ravel()), scale * (rows.T @ rows)

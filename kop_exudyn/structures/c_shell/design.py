@@ -28,6 +28,7 @@ from ...equilibrium.newton import solve as fast
 from ...equilibrium.system import System
 from ...errors import InputError, SimulationFailure
 from ...geometry.centring import middle_of, moved
+from ...geometry.extent import size_of_points
 from ...geometry.linkage import refuse_loose_parts
 from ...geometry.network import CurveNetwork, network_from_dict
 from ...geometry.network_faces import triangulate
@@ -56,7 +57,9 @@ _OPENING_STEP = 0.1  # rad of mean joint angle a step
 _LARGEST_CORNER = 2.5  # rad
 _IMPERFECTION = 1e-3  # of the size, height of the shallow surface that imperfect rest shapes follow
 _REFINEMENTS = 3  # of the target's triangles
-_INWARD = 1e-6  # of the way to the middle
+_INWARD, _SLIVER = 1e-6, 1e-9  # of the way to the middle
+_STRETCH = 1e-7  # tells equally good triangulations apart
+_ARM = 0.37  # of the longest: one that gives a net its direction
 
 
 class CShell(Design):
@@ -216,7 +219,7 @@ class CShell(Design):
                 shape = self.layout.straightened(smooth.state, self.scene("deployed"))
                 stations[number] = replace(stations[number], lifted=Start(shape, smooth.torque))
         *way, last = stations
-        return Way(self._rest_opening, tuple(way), last, self.joints, self.target.diagonal)
+        return Way(self._rest_opening, tuple(way), last, self.joints, self.target.size)
 
     def assembled(self, q: np.ndarray, equilibria: Mapping[str, Equilibrium]) -> Start:
         """The rest state, off the floor."""
@@ -251,25 +254,26 @@ class CShell(Design):
         from scipy.interpolate import CloughTocher2DInterpolator
         from scipy.spatial import Delaunay
 
-        state, flat = self.smooth_path[-1].state, self.layout.smooth[:, :2]
+        state = self.smooth_path[-1].state
         if self.target_mesh is not None:
             return target_on_mesh(self.target_mesh, state.positions[self.joints])
         vertices, faces = self.network.joints, self._triangles
         for _ in range(_REFINEMENTS):
             vertices, faces = _split(vertices, faces)
+        flat = self.layout.smooth[:, :2]
+        untied = _untied(flat)
+        flat, vertices = flat @ untied, vertices @ untied
         lift = CloughTocher2DInterpolator(Delaunay(flat), state.positions, tol=1e-10)
-        lifted = lift(vertices)
+        # straight outer curves have slivers of triangles, and points outside, made by rounding
+        inward = flat.mean(axis=0) - vertices
+        lifted = lift(vertices + _SLIVER * inward)
         joints = state.positions[self.joints]
-        lifted[: len(joints)] = joints  # exact there; the rest lies inside the flat hull,
-        outside = np.isnan(lifted).any(axis=1)  # but for round-off beside straight outer curves
-        lifted[outside] = lift(
-            vertices[outside] + _INWARD * (flat.mean(axis=0) - vertices[outside])
-        )
+        lifted[: len(joints)] = joints  # exact there
+        outside = np.isnan(lifted).any(axis=1)
+        lifted[outside] = lift((vertices + _INWARD * inward)[outside])
         used = np.unique(faces)
         faces = np.searchsorted(used, faces)
-        return Target(
-            lifted[used], faces, joints, float(np.linalg.norm(np.ptp(lifted[used], axis=0)))
-        )
+        return Target(lifted[used], faces, joints, size_of_points(lifted[used]))
 
 
 def open_up(
@@ -303,6 +307,19 @@ def _bulge(x: np.ndarray) -> np.ndarray:
     odd = r * (0.5 * y[:, 0] + 0.3 * y[:, 1])
     height = r + 0.7 * (y[:, 0] ** 2 - y[:, 1] ** 2) + 0.3 * y[:, 0] * y[:, 1] + odd
     return height - height.mean()
+
+
+def _untied(flat: np.ndarray) -> np.ndarray:
+    """A map (2, 2) of the plane that is the identity to 1e-7, and takes points that lie on one
+    circle, as those of symmetric nets do, off it: so that they are triangulated in the same way
+    however a net (n, 2) is turned. Lines stay lines. It stretches along a direction that turns with
+    the net, at an odd angle to it."""
+    arms = flat - flat.mean(axis=0)
+    lengths = np.linalg.norm(arms, axis=1)
+    first = arms[np.argmax(lengths > _ARM * lengths.max())]
+    angle = np.arctan2(first[1], first[0]) + 0.7
+    along = np.array([np.cos(angle), np.sin(angle)])
+    return np.eye(2) + _STRETCH * np.outer(along, along)
 
 
 def _split(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

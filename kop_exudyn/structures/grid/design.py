@@ -16,6 +16,7 @@ import numpy as np
 
 from ...errors import InputError, SimulationFailure
 from ...geometry.centring import middle_of, moved
+from ...geometry.extent import size_of_points
 from ...geometry.mesh_files import read_mesh
 from ...geometry.network import CurveNetwork
 from ...geometry.surfaces import PLAN_AXES, AnalyticSurface, ScaledSurface, Surface
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from .scene import GridScene
 
 _LARGEST_CORNER = 1.5  # rad
-_TARGET_CELLS = 96  # of the target surface, along each parameter
+_TARGET_CELLS = 68  # along each parameter, four triangles a cell
 _MARGIN = 0.75  # of the longest span, by which the target goes beyond the outermost joints
 
 
@@ -119,13 +120,13 @@ class Grid(Design):
         """The design surface around the grid, finely triangulated; positions: the joints on it, as
         they were drawn.
 
-        The diagonal is that of the joints' bounding box: the surface itself may go on.
+        Its size is that of the joints: the surface itself may go on.
         """
         joints = self.surface.points(self.network.joints)
         vertices, faces = _triangulated(
             self.surface, self.network, joints, _MARGIN * self._longest_span()
         )
-        return Target(vertices, faces, joints, float(np.linalg.norm(np.ptp(joints, axis=0))))
+        return Target(vertices, faces, joints, size_of_points(joints))
 
     def _longest_span(self) -> float:
         return max(float(lamella.spans.lengths.max()) for lamella in self.straight.lamellas)
@@ -184,18 +185,22 @@ def _triangulated(
             np.minimum(uv.max(axis=0) + widening, surface.upper),
         )
     ]
-    n = _TARGET_CELLS + 1
-    plane = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    corners = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    middles = 0.25 * (corners[:-1, :-1] + corners[1:, :-1] + corners[1:, 1:] + corners[:-1, 1:])
+    plane = np.concatenate([corners.reshape(-1, 2), middles.reshape(-1, 2)])
     usable = surface.contains(plane)
     vertices = np.full((len(plane), 3), np.inf)
     vertices[usable] = surface.points(plane[usable])
     usable &= np.isfinite(vertices).all(axis=1)
     usable[usable] = cKDTree(joints).query(vertices[usable])[0] <= 2 * margin
+    n = _TARGET_CELLS + 1
     number = np.arange(n * n).reshape(n, n)
-    a, b, c, d = (
+    around = [
         k.ravel() for k in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:])
-    )
-    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    ]
+    middle = n * n + np.arange(len(around[0]))
+    # four triangles a cell: neither of its diagonals comes first, whichever way u and v run
+    faces = np.concatenate([np.stack([around[k - 1], around[k], middle], axis=1) for k in range(4)])
     faces = faces[usable[faces].all(axis=1)]
     used = np.unique(faces)
     return vertices[used], np.searchsorted(used, faces)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...errors import InputError, SimulationFailure
 from ...geometry.centring import middle_of, moved
+from ...geometry.extent import size_of_points
 from ...kit.groups import ElementGroup
 from ...rods.sections import Material, material_from_dict
 from ...units import Units
@@ -26,6 +27,7 @@ from ..base import (
 )
 from ..fitting import best_placement
 from ..hardware import CellHardware
+from ..loads import hold_in_place
 from .bodies import RODS, joint_bodies
 from .deployment import Deployment, Solver, Stage, drawn_towards, follow, state_of
 from .hardware import cell_hardware
@@ -314,10 +316,12 @@ class Umbrella(Design):
         positions = state.positions[self.joints]
         if self.mesh.target is not None:
             vertices, faces = self.mesh.target.vertices, self.mesh.target.faces
+            if self.pins is None:
+                positions = _laid_on(self.mesh.target, positions)
         else:
             vertices, faces = self._own_surface(state)
         used = vertices[np.unique(faces)]
-        return Target(vertices, faces, positions, float(np.linalg.norm(np.ptp(used, axis=0))))
+        return Target(vertices, faces, positions, size_of_points(used))
 
     def _own_surface(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Triangles between each cell's midpoint and its X joints, in pairs."""
@@ -379,6 +383,18 @@ class Umbrella(Design):
 
 
 register_format("released umbrella mesh", is_release, Umbrella.from_release)
+
+
+def _laid_on(target: UmbrellaTarget, positions: np.ndarray) -> np.ndarray:
+    """X joints (n, 3), moved rigidly to fit their places in the target as well as they can: which
+    joints an unsupported mesh is held at, and along which axes, doesn't count. As they are where
+    the target doesn't know enough places."""
+    known = np.isfinite(target.crossings).all(axis=1)
+    if not hold_in_place(target.crossings[known]):
+        return positions
+    n = int(np.count_nonzero(known))
+    placement = best_placement(positions[known], target.crossings[known], np.full(n, 1 / n))
+    return placement.apply(positions)
 
 
 @register_centring("umbrella")

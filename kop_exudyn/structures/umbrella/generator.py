@@ -243,7 +243,7 @@ class _Flattened:
     def _locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Faces (n,) of the plane's points (n, 2), and barycentric coordinates (n, 3) in them."""
         found = self._map.closest(np.column_stack([points, np.zeros(len(points))]))
-        if np.sqrt(found.squared_distances.max()) > _ON_SURFACE * self._map.diagonal:
+        if np.sqrt(found.squared_distances.max()) > _ON_SURFACE * self._map.size:
             raise InputError(
                 "the base mesh reaches beyond the surface: take fewer cells or smaller plates, or, "
                 "where the surface isn't drawn in the design's unit, say so by --scale",

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, SimulationFailure
+from ...geometry.extent import size_of_points
 from ...rods.rotations import exp_so3
 from ...scene.scene import Driven, Scene
 from ...scene.state import State
@@ -16,7 +17,7 @@ from ..loads import hold_in_place
 from .layout import BaseMesh
 from .mesh import UmbrellaTarget
 
-# How far a pin may go from its first place, as a share of the pins' bounding-box diagonal.
+# How far a pin may go from its first place, as a share of the pins' size.
 _REACH = 0.1
 # Steps to place a mesh where it is held, how exactly, relative to its places, and rad a step.
 _PLACING, _PLACED, _LARGEST_TURN = 50, 1e-14, 0.3
@@ -48,7 +49,7 @@ class Pins:
     @property
     def reach(self) -> float:
         """How far each coordinate of a pin may go from its first place."""
-        return _REACH * float(np.linalg.norm(np.ptp(self.positions, axis=0)))
+        return _REACH * size_of_points(self.positions)
 
     def scene(self, scene: Scene, bodies: np.ndarray, first: int) -> Scene:
         """A scene with pinned bodies (m,) whose coordinates are the parameters from number `first`

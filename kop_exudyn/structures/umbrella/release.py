@@ -16,6 +16,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...geometry.centring import middle_of, moved
+from ...geometry.extent import size_of_points
 from .mesh import BOTTOM, TOP, UmbrellaMesh, UmbrellaRods, UmbrellaTarget, arm_lengths
 
 _MAX_ITEMS = 2_000_000
@@ -115,14 +116,10 @@ def release_mesh(data: Mapping[str, Any], source: str = "umbrella mesh") -> Umbr
         width=read.number("width", _WIDTH / unit),
         plate_edge=read.number("plate_edge_length", _PLATE_EDGE / unit),
         spacing=read.number("target_spacing_factor", 5.0) * thickness,
-        size=_diagonal(positions),
+        size=1.0 if "bbox_diagonal" in data else size_of_points(positions),
         target=_target(read, crossings, n, n_cells),
         unit=unit,
     )
-
-
-def _diagonal(positions: np.ndarray) -> float:
-    return float(np.linalg.norm(np.ptp(positions, axis=0)))
 
 
 def _frames(read: _Fields, n: int) -> np.ndarray:
