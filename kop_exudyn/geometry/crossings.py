@@ -12,7 +12,6 @@ import shapely
 
 from ..errors import InputError
 from .curves import Curve
-from .extent import size_of_points
 
 # Relative to the size of all curves: an end this near to another curve lies on it; two such near
 # points are one.
@@ -39,9 +38,9 @@ class Crossing:
 
 
 def size_of(curves: Sequence[Curve]) -> float:
-    """Size of all curves together, see `extent.size_of_points`."""
+    """Diagonal of the bounding box of all curves."""
     points = np.concatenate([curve.position(curve.stations) for curve in curves])
-    return size_of_points(points)
+    return float(np.hypot(*np.ptp(points, axis=0)))
 
 
 def find_crossings(curves: Sequence[Curve]) -> list[Crossing]:

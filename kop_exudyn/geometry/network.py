@@ -85,7 +85,7 @@ class CurveNetwork:
     places (n, 2) : where on these curves' strands the joint stands: index into their `joints`
     strands : one a curve
     opens (n,) : whether the joint's angle counts as part of the opening, see `families`
-    size : of all curves together, see `extent.size_of_points`
+    size : diagonal of the curves' bounding box
     """
 
     joints: np.ndarray

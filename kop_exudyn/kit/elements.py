@@ -15,6 +15,9 @@ from .kinds import PartKind, Variants, part_kind
 Penalties = Mapping[str, Sequence[float]]  # kind -> (k_p,) weights that replace the kind's own
 
 
+_EQUAL = 1e-10  # of the largest element: distances that differ by less are equal
+
+
 @dataclass(frozen=True)
 class Labels:
     """Part and variant of each element (n,), and its squared distance to what they realise (n,)."""
@@ -154,7 +157,10 @@ def _nearest_in_block(block: Block, parts: np.ndarray) -> tuple[np.ndarray, np.n
     squared = np.sum(block.variants.residuals(block.values, parts) ** 2, axis=3).reshape(
         len(block.values), -1
     )
-    best = squared.argmin(axis=1)
+    # of equally near ones the first, whatever rounding leaves of an element: a corner of no angle,
+    # say, would take its part's variants by chance
+    least, error = squared.min(axis=1, keepdims=True), _EQUAL * np.abs(block.values).max()
+    best = (squared <= least + error * (np.sqrt(least) + error)).argmax(axis=1)
     return best // n_variants, best % n_variants, squared[np.arange(len(best)), best]
 
 

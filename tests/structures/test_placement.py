@@ -23,6 +23,8 @@ from kop_exudyn.geometry.surfaces import PLAN_AXES
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.rods.rotations import exp_so3
 from kop_exudyn.scene.builder import SceneBuilder
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.structures.base import Target, design_from_dict
 from kop_exudyn.structures.fitting import Placement, TargetFitting
 from kop_exudyn.structures.umbrella.release import centred_release
@@ -115,6 +117,32 @@ def test_fits_to_a_turned_target_are_the_same(target, seed):
     found = [TargetFitting(t)(y) for t, y in ((here, x), (there, motion.apply(x)))]
     assert found[1].max_percent == pytest.approx(found[0].max_percent, abs=1e-9)
     assert found[1].mean_percent == pytest.approx(found[0].mean_percent, abs=1e-9)
+
+
+def test_kits_of_turned_designs_are_the_same(repository):
+    """Two tiny C-shells, as they are and each turned and moved for itself."""
+    kits = []
+    for seed in (None, 5):
+        designs = []
+        for name in ("01_sinh", "03_exp"):
+            data = json.loads((repository / "models" / "small" / f"{name}.json").read_text())
+            designs.append(
+                design_from_dict(
+                    data if seed is None else placed(data, 3.0, seed + len(designs))[0]
+                )
+            )
+        stages = StageSettings(
+            schedule=(1e4,), relaxed_steps=2, assigned_steps=2, reassignments=0, path_steps=2
+        )
+        settings = JobSettings(jobs=1, baselines=False, stages=stages)
+        kits.append(optimize_kit(designs, {"linear": 6, "angular": 3}, settings=settings))
+    near, turned = (kit.kit.parts for kit in kits)
+    assert near.keys() == turned.keys() == {"linear", "angular"}
+    for kind in near:
+        assert turned[kind] == pytest.approx(near[kind], rel=1e-6)
+    for number in range(2):
+        a, b = (kit.summary("assigned", number)["fit"] for kit in kits)
+        assert b["max_percent"] == pytest.approx(a["max_percent"], abs=1e-5)
 
 
 def percentages(design, state=None):

@@ -28,6 +28,10 @@ from ...structures.fitting import FitResult
 from .base import Reference, Term, register_term
 
 _P = 8  # close enough to the maximum, and the curvature still bounded
+# Of S0, by which all u are raised, and S is lowered again: where there is no stress, as in the
+# assembly of an input, the curvature of the p-mean depends on the direction in which one comes, and
+# would be that of rounding.
+_FLOOR = 1e-9
 
 
 @register_term
@@ -46,7 +50,7 @@ class Stress(Term):
                 "the rods' cross-sections aren't known", source=design.name, field="weights.stress"
             )
         fitted = design.fitted_role
-        self._scale = 1.0
+        self._scale, self._floor = 1.0, 0.0
         self._scale = self.value(fitted, reference.equilibria[fitted.name])
         if not self._scale > 0:
             raise InputError(
@@ -54,9 +58,10 @@ class Stress(Term):
                 source=design.name,
                 field="weights.stress",
             )
+        self._floor = _FLOOR * self._scale
 
     def value(self, role: Role, equilibrium: Equilibrium, fit: FitResult | None = None) -> float:
-        return _p_mean(*self._squares(role, equilibrium)) / self._scale
+        return (_p_mean(*self._squares(role, equilibrium)) - self._floor) / self._scale
 
     def gradient(self, role: Role, sensitivities: Sensitivities, fit: FitResult) -> np.ndarray:
         return sensitivities.stress_adjoint(self._by_stress(role, sensitivities.equilibrium)[0])
@@ -74,11 +79,12 @@ class Stress(Term):
         return gradient, rows.T @ rows + across.T @ across - less * np.outer(gradient, gradient)
 
     def _squares(self, role: Role, equilibrium: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
-        """u (E,) and the elements' shares (E,) of the rods' length."""
+        """u (E,), all raised by the floor, and the elements' shares (E,) of the rods' length."""
         form = self._forms[role.name]
         lengths = self.design.scene(role.name).rest_lengths(equilibrium.q)
         share = np.where(form.any(axis=1), lengths, 0.0)
-        return np.einsum("er,er->e", form, equilibrium.stress**2), share / share.sum()
+        u = np.einsum("er,er->e", form, equilibrium.stress**2)
+        return u + self._floor, share / share.sum()
 
     def _by_stress(
         self, role: Role, equilibrium: Equilibrium
