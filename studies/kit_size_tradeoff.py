@@ -10,8 +10,8 @@ fewer parts, and the assigned stage optimises these and which part serves which 
 rounds and without leaps, which keeps the sweep within half an hour. A kit that is worse than a
 smaller one is then sought again from that one.
 
-Deviations are distances of the joints from the target surfaces, in % of their bounding-box
-diagonals; every state is an equilibrium that Exudyn confirmed. Kit size counts pieces to make, as
+Deviations are distances of the joints from the target surfaces, in % of their
+sizes; every state is an equilibrium that Exudyn confirmed. Kit size counts pieces to make, as
 many of each part as the design that needs most of it, in % of the elements of all designs: 20 % at
 best for five designs. The knee is the point farthest below the straight line from the first to the
 last point, both axes scaled to [0, 1] (the rule of Satopaa et al., 2011), on the curve of the

@@ -9,7 +9,7 @@ every time; the kits may be others.
 
 The spread is by how much the largest of the ten values is above the smallest. Deviations are those
 of the designs as they are kept and as they open from their assembly, whichever is larger, in % of
-their bounding-box diagonals.
+their sizes.
 """
 
 from __future__ import annotations

@@ -68,7 +68,7 @@ class SimulationResult:
     @property
     def displaced_percent(self) -> float:
         """Largest distance of a joint from its own place in the target, % of the target's
-        bounding-box diagonal.
+        size.
 
         Deviations are distances from the surface: a grid that shears, or closes, may slide along
         it.

@@ -74,7 +74,7 @@ class Forgiveness:
 
     tolerance : standard deviations of the errors
     spread_percent : root mean square displacement of the joint that moves most, to first order, %
-        of the box diagonal
+        of the target's size
     samples, snapped : sets of errors that were solved; those that end in another state, or in none
     max_percent_p95 : 95th percentile of the samples' largest deviations, %; None without any
     confirmed : how many of the samples' equilibria Exudyn was asked for and confirmed
@@ -99,7 +99,7 @@ class Buildable:
 
     design : its name
     moved_percent : distance from the state shown to the one that the assembly opens into, % of the
-        box diagonal; None where that is not known
+        target's size; None where that is not known
     utilisation : state -> equivalent stress over elastic limit, None where no limit is known
     softest : eigenvalue of the deployed state's softest mode over the input design's
     softest_on_the_way : the smallest eigenvalue of the states that it is opened through, once it

@@ -15,8 +15,8 @@ from .kit_picture import png
 from .page import Card
 
 PERCENT = (
-    "Deviations are distances from the target surface at the best placement, in % of the diagonal "
-    "of the target's bounding box"
+    "Deviations are distances from the target surface at the best placement, in % of the "
+    "target's size (√3 times its mean width, about the diagonal of its bounding box)"
 )
 
 
@@ -48,12 +48,12 @@ def design_cards(
 
 def percent_explained(result: KitResult) -> str:
     """The sentence that says once what deviations in percent are of, with each design's
-    diagonal."""
-    diagonals = "; ".join(
-        f"{design.name} {in_millimetres(float(reference.target.diagonal), result.units, 4)}"
+    size."""
+    sizes = "; ".join(
+        f"{design.name} {in_millimetres(float(reference.target.size), result.units, 4)}"
         for design, reference in zip(result.designs, result.references)
     )
-    return f"{PERCENT} ({diagonals})."
+    return f"{PERCENT} ({sizes})."
 
 
 def deviation_rows(result: KitResult) -> tuple[list[str], list[list[Any]]]:

@@ -124,7 +124,7 @@ def opening_path(
         return []
     x, y = (eq.state.positions[design.joints] for eq in (opened[-1], final))
     placed = best_placement(x, y, np.full(len(x), 1 / len(x)))
-    apart = np.abs(placed.apply(x) - y).max() / design.target.diagonal
+    apart = np.abs(placed.apply(x) - y).max() / design.target.size
     if apart > SAME_STATE:
         log.warning(
             "%s: the assembly opens into another state, %.2g %% of its size away; the opening is "

@@ -155,7 +155,7 @@ def _samples(
             - wanted
         )
         missed = np.linalg.norm(moved - (J @ errors).reshape(-1, 3), axis=1).max()
-        away = missed > SAME_STATE * evaluation.fit.diagonal
+        away = missed > SAME_STATE * evaluation.fit.size
         yield Sample(
             errors,
             moved,

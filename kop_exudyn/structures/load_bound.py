@@ -79,7 +79,7 @@ class LoadBound:
         steps = {float(f) for f in np.linspace(0, max(factors), _STEPS + 1)[1:]}
         self._steps: list[_Asked] = []
         self._own = threading.local()
-        self._diagonal = design.target.diagonal
+        self._size = design.target.size
         for factor in sorted(steps | factors):
             scene = loaded_scene(design, self._scene, unloaded, case, factor)
             bound = StressBound(design, scene, safety) if safety is not None else None
@@ -118,7 +118,7 @@ class LoadBound:
 
     def _apart(self, a: Equilibrium, b: Equilibrium) -> float:
         """How far apart a body of the rods is in two states, as a share of the size."""
-        return float(np.linalg.norm(self._moves(a, b), axis=1).max()) / self._diagonal
+        return float(np.linalg.norm(self._moves(a, b), axis=1).max()) / self._size
 
     def utilisation(
         self, unloaded: Equilibrium, loaded: Mapping[float, Equilibrium]

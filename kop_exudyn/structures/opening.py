@@ -158,7 +158,7 @@ class Way:
         """Whether all joints lie in one plane."""
         x = state.positions[self.joints]
         height = np.linalg.svd(x - x.mean(axis=0), compute_uv=False)[-1] / np.sqrt(len(x))
-        return bool(height < _FLAT * self.diagonal)
+        return bool(height < _FLAT * self.size)
 
     def apart(self, a: Equilibrium, b: Equilibrium) -> float:
         """The largest distance of a joint in two states at their best placement, as a share of

@@ -119,9 +119,9 @@ def test_deviations_are_the_same_in_percent_and_units(finished):
     assert headings[2] == "joints, max units of length"  # the toys name no units
     for n, row in enumerate(rows):
         fit = data["designs"][n]["assigned"]["fit"]
-        diagonal = result.references[n].target.diagonal
-        assert row[1] == fit["max_percent"] == pytest.approx(100 * row[2] / diagonal)
-        assert row[4] == fit["pieces_max_percent"] == pytest.approx(100 * row[5] / diagonal)
+        size = result.references[n].target.size
+        assert row[1] == fit["max_percent"] == pytest.approx(100 * row[2] / size)
+        assert row[4] == fit["pieces_max_percent"] == pytest.approx(100 * row[5] / size)
 
 
 def test_the_page_names_designs_and_settings(finished):

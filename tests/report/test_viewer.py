@@ -190,7 +190,7 @@ def test_shells_are_shown_opening_from_their_flat_assembly(result, kit_page):
         closed = next(r.opening for r in design.roles if r.name == "rest")
         assert len(path) >= 2 and (np.diff(np.abs(np.array(openings) - closed)) < 0).all()
         assert openings[-1] == closed
-        assert np.ptp(path[-1].state.positions[:, 2]) < 1e-6 * design.target.diagonal
+        assert np.ptp(path[-1].state.positions[:, 2]) < 1e-6 * design.target.size
         assert sum(not s.final for s in shown.states) == len(path)
         assert len(opening_path(design, outcome.equilibria, 1)) == 1
         assert opening_path(design, outcome.equilibria, 0) == []
@@ -226,7 +226,7 @@ def test_umbrella_meshes_are_shown_opening_from_their_compact_state(repository):
     heights = [np.linalg.svd(y - y.mean(axis=0))[1][2] for y in x]
     assert heights[-1] < 1e-2 * heights[0]  # the stack is flat
     steps = np.abs(np.diff([equilibria["deployed"].state.positions[design.joints], *x], axis=0))
-    assert steps.max() < 0.5 * design.target.diagonal  # it stays where it is held
+    assert steps.max() < 0.5 * design.target.size  # it stays where it is held
     page = design_scene(design, equilibria, frames=4)
     frames = [s for s in page.designs[0].states if not s.final]
     assert len(frames) == 4 and all(s.opening is None for s in frames)

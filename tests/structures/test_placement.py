@@ -199,8 +199,7 @@ def test_simulations_and_files_have_the_users_coordinates(repository):
     for near, far in zip(states_of_simulation(a), states_of_simulation(b)):
         assert np.abs(motion.apply(near.points) - far.points).max() < 1e-7 * size
         if near.target is not None:
-            # beside the joints a symmetric net's target is interpolated over either diagonal
-            assert np.nanmax(np.abs(near.deviations - far.deviations)) < 3e-4 * size
+            assert np.nanmax(np.abs(near.deviations - far.deviations)) < 1e-9 * size
 
 
 @pytest.mark.parametrize("name", ["small/01_sinh.json", "umbrellas/dome.json"])
