@@ -145,7 +145,8 @@ class Way:
         first = next((k for k, s in enumerate(stations) if s.lifted is not None), 0)
         for number, (station, near) in enumerate(zip(stations, (*known, deployed))):
             try:
-                if number > first and not (station.lifted and self.is_flat(found[-1].state)):
+                lifted = station.lifted is not None and (not found or self.is_flat(found[-1].state))
+                if number >= max(first, 1) and not lifted:
                     before = systems[self.stations[number - 1].scene]
                     found.append(_led(before, systems[station.scene], q, found[-1], station, parts))
                 else:

@@ -8,6 +8,7 @@ import pytest
 from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.io.designs import load_design
+from kop_exudyn.kit.cluster import cluster
 from kop_exudyn.structures.opening import SAME_STATE
 
 
@@ -97,6 +98,20 @@ def test_it_is_lifted_until_it_stays_up(shell, states):
     lifts = [before for before in asked if before is stations[first].lifted]
     assert len(lifts) == 2  # and not a third time, once it is up
     assert way.apart(other.followed(shell.systems, q, found[:-1], found[-1])[-1], found[-2]) < 1e-6
+
+
+def test_what_rises_by_itself_is_not_lifted(repository):
+    """Of parts that don't suit it a shell is up before the station at which it would be lifted;
+    opening it and following its way agree."""
+    design = load_design(repository / "models" / "small" / "06_moebius.json")
+    found = cluster(design.groups, design.parameters, {"linear": 2, "angular": 1})
+    q = found.assignment.matrix(found.kit) @ found.kit.vector
+    states = opened(design, q)
+    way = design.way
+    first = [station.lifted is not None for station in way.stations].index(True)
+    assert first > 0 and not way.is_flat(states[first - 1].state)
+    again = way.followed(design.systems, q, states[:-1], states[-1])
+    assert max(map(way.apart, again, states)) < 1e-6
 
 
 def test_ways_are_followed_to_other_parameters(shell, states):
