@@ -30,6 +30,7 @@ from .reuse import counts_of, fabricated, kit_size_percent
 log = logging.getLogger(__name__)
 
 _SHARE = 0.25  # of a kind's parts, by which kits grow, and shrink at first
+_FAR = 1.3  # times the deviation allowed, above which kits double
 _EXCESS = 1e-3  # of the elastic limit: what the search's tolerances leave
 _MOST = 60  # parts of a kind; designs that need more share nothing worth the name
 
@@ -170,7 +171,7 @@ def smallest_kit(
 
     From a kit that is good enough, parts of the dearest kind are merged away, a quarter of them at
     first, then fewer, until no kind can do with one part less. A kit that isn't good enough grows
-    by a quarter of every kind until it is.
+    by a quarter of every kind until it is; one that is far from it doubles.
 
     Returns the kit, None where none was found up to 60 parts of a kind, and all kits in the order
     in which they were looked at.
@@ -187,7 +188,9 @@ def smallest_kit(
     now = chain.kit(dict(first))
     most = {kind: min(_MOST, count) for kind, count in _elements(designs).items()}
     while not good(now):
-        sizes = {k: min(most[k], n + max(1, round(_SHARE * n))) for k, n in now.sizes.items()}
+        far = np.isfinite(now.max_percent) and now.max_percent > _FAR * limit
+        share = 1.0 if far else _SHARE
+        sizes = {k: min(most[k], n + max(1, round(share * n))) for k, n in now.sizes.items()}
         if sizes == now.sizes:
             return None, chain.kits
         now = chain.kit(sizes, now)
