@@ -43,6 +43,18 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "gravity, where the design names its units) or a vector X,Y,Z, in the design's units; "
         "instead of the design file's gravity. Materials need a density",
     )
+    for name, what in (
+        ("line", "length on every rod"),
+        ("area", "area of the target surface, as cladding,"),
+        ("plan", "area in plan, as snow,"),
+    ):
+        parser.add_argument(
+            f"--{name}",
+            type=gravity,
+            metavar="P",
+            help=f"force per {what} down the z axis or a vector X,Y,Z, in the design's units; "
+            f"instead of the design file's {name}",
+        )
     parser.add_argument(
         "--engine",
         choices=("fast", "exudyn"),
@@ -67,9 +79,14 @@ def run(args: argparse.Namespace) -> int:
     from ..io.designs import load_design
 
     design = load_design(args.design)
-    loads = None
+    changes = {
+        name: value
+        for name in ("line", "area", "plan")
+        if (value := getattr(args, name)) is not None
+    }
     if args.gravity is not None:
-        loads = replace(design.loads, gravity=_gravity(design, args))
+        changes["gravity"] = _gravity(design, args)
+    loads = replace(design.loads, **changes) if changes else None
     try:
         result = simulate(design, loads, engine=args.engine).to_dict()
     except SimulationFailure as failure:
@@ -154,9 +171,21 @@ def _under_load(loaded: dict, units: Units | None) -> dict[str, str]:
     force = ", ".join(f"{component:.4g}" for component in loaded["total_force"])
     force = f"({force}) {unit_of('force', units)}"
     largest, mean = (with_unit(deflection[name], "length", units, 3) for name in ("max", "mean"))
+    sizes = [math.dist((0, 0, 0), row) for row in loaded["reactions"] if None not in row]
+    worst = max(sizes, default=None)
+    reactions = (
+        {}
+        if worst is None
+        else {"reactions": f"{with_unit(worst, 'force', units, 4)} at the support with the most"}
+    )
     return {
         "load": f"{force} in all, held at {len(loaded['supports'])} joints",
+<<<<<<< HEAD
         "deflection": f"max {largest} ({deflection['max_percent']:.3g} % of the size), "
+=======
+        **reactions,
+        "deflection": f"max {largest} ({deflection['max_percent']:.3g} % of the diagonal), "
+>>>>>>> f5bc18d (Loads per length and area, combinations, reactions; load cases say what is wrong with them)
         f"mean {mean} ({deflection['mean_percent']:.3g} %)",
         "stress, loaded": _stress(loaded["strength"], units),
         "stable, loaded": "yes" if loaded["stable"] else "no",

@@ -8,6 +8,7 @@ the state is the one that the unloaded one deforms into.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,12 +19,13 @@ from ..equilibrium.engines import engine as solver_of
 from ..equilibrium.equilibria import Equilibrium
 from ..equilibrium.exudyn_confirm import Confirmation, confirm
 from ..equilibrium.newton import refine
-from ..equilibrium.system import System
+from ..equilibrium.system import GRADIENT, System
 from ..errors import InputError, SimulationFailure
+from ..rods.sections import Section
 from ..scene.loads import DeadForces, Scaled, with_self_weight
 from ..scene.scene import Scene
 from .base import Design
-from .loads import LoadCase, hold_in_place
+from .loads import LoadCase, hold_in_place, tributary_areas
 from .strength import Strength, material_values, materials_of, rod_strength
 
 _STEPS = 4
@@ -40,6 +42,7 @@ class LoadedState:
     displacements : (N, 3) of the rods' nodes against the unloaded state
     size : of the target, to which percentages refer
     equilibrium, confirmation : of the loaded scene; the state is Exudyn's
+    reactions : (k, 3) forces of the supports on the structure
     """
 
     case: LoadCase
@@ -51,6 +54,13 @@ class LoadedState:
     confirmation: Confirmation
     strength: Strength
     joints: np.ndarray
+    reactions: np.ndarray
+
+    def __repr__(self) -> str:
+        return (
+            f"<LoadedState under {self.case.name!r}: deflection {self.deflections.max():.3g}, "
+            f"{len(self.supports)} supports>"
+        )
 
     @property
     def deflections(self) -> np.ndarray:
@@ -65,6 +75,9 @@ class LoadedState:
             "gravity": None if case.gravity is None else case.gravity.tolist(),
             "total_force": self.total_force.tolist(),
             "supports": self.supports.tolist(),
+            "reactions": [
+                [None if np.isnan(v) else v for v in row] for row in self.reactions.tolist()
+            ],
             "deflection": {
                 "max": float(d.max()),
                 "mean": float(d.mean()),
@@ -120,6 +133,7 @@ def loaded_state(
         confirmation,
         rod_strength(scene, found, materials_of(design)),
         design.report_positions(found.state),
+        support_reactions(design, scene, found, supports),
     )
 
 
@@ -216,6 +230,13 @@ def loaded_scene(
     terms = list(scene.terms)
     if len(case.joints):
         terms.append(Scaled(DeadForces(design.joints[case.joints], case.forces), share))
+    if case.area is not None or case.plan is not None:
+        forces = case.on_joints(*tributary_areas(design.target.positions))
+        terms.append(Scaled(DeadForces(design.joints, forces), share))
+    if case.line is not None:
+        own = np.broadcast_to(share * case.line, (len(scene.elements), 3))
+        scene = replace(scene, weight=own if scene.weight is None else scene.weight + own)
+        terms += _on_rigid(scene, unloaded, lambda section: 1.0, share * case.line)
     if case.gravity is not None and case.gravity.any():
         materials = materials_of(design)
         density = material_values(scene, materials, "density")
@@ -235,8 +256,26 @@ def loaded_scene(
 def _rigid_weight(
     scene: Scene, unloaded: Equilibrium, density: float | None, gravity: np.ndarray
 ) -> list[DeadForces]:
-    """The weight of pieces that don't bend, which are of the stiffest material, at their
-    middles."""
+    """The weight of pieces that don't bend, which are of the stiffest material."""
+
+    def mass(section: Section) -> float:
+        if density is None:
+            raise InputError(
+                "self-weight needs the density of every material", field="material.density"
+            )
+        return density * section.area
+
+    return _on_rigid(scene, unloaded, mass, gravity)
+
+
+def _on_rigid(
+    scene: Scene,
+    unloaded: Equilibrium,
+    per_length: Callable[[Section], float],
+    vector: np.ndarray,
+) -> list[DeadForces]:
+    """What acts along pieces that don't bend, at their middles: a vector (3,) times their length
+    times a number that their section gives."""
     rigid = [
         (chain, chain.section)
         for chain in scene.chains
@@ -244,22 +283,38 @@ def _rigid_weight(
     ]
     if not rigid:
         return []
-    if density is None:
-        raise InputError(
-            "self-weight needs the density of every material", field="material.density"
-        )
     x, arms = scene.node_poses(unloaded.state)[0], scene.node_arms(unloaded.state)[0]
-    mass = [
-        density * section.area * np.linalg.norm(x[chain.nodes[-1]] - x[chain.nodes[0]])
+    sizes = [
+        per_length(section) * np.linalg.norm(x[chain.nodes[-1]] - x[chain.nodes[0]])
         for chain, section in rigid
     ]
     return [
         DeadForces(
             [scene.node_body[chain.nodes[0]] for chain, _ in rigid],
-            np.outer(mass, gravity),
+            np.outer(sizes, vector),
             [arms[chain.nodes[[0, -1]]].mean(axis=0) for chain, _ in rigid],
         )
     ]
+
+
+def support_reactions(
+    design: Design, scene: Scene, found: Equilibrium, supports: np.ndarray
+) -> np.ndarray:
+    """(k, 3) forces of the supports on the structure: the gradient of the energy by the joints'
+    places, which is what holds them there. NaN where the design itself prescribes a place.
+
+    scene : with supports and loads; supports (k,) : joints
+    """
+    dofs = 6 * design.joints[supports][:, None] + np.arange(3)
+    pinned = scene.pinned.copy()
+    pinned[dofs] = False
+    system = System(replace(scene, pinned=pinned))
+    system.set_parameters(found.q)
+    system.assemble(found.state, GRADIENT)
+    places = np.full(len(pinned), -1)
+    places[system.sparsity.free] = np.arange(system.n_unknowns)
+    at = places[dofs]
+    return np.where(at >= 0, system.gradient[np.maximum(at, 0)], np.nan)
 
 
 def _total_force(scene: Scene, unloaded: Equilibrium) -> np.ndarray:

@@ -12,6 +12,8 @@ import numpy as np
 from ..errors import InputError
 
 _STRAIGHT = 1e-3  # points within this share of their extent from a line don't hold a structure
+_SPREAD = ("gravity", "line", "area", "plan")  # loads of three numbers, or None
+_OUTSIDE = 3.0  # median edges: longer triangles span what is outside of a design
 
 
 def hold_in_place(points: np.ndarray) -> bool:
@@ -49,6 +51,44 @@ class DeflectionLimit:
         return float(min(own, np.inf if self.span_over is None else span / self.span_over))
 
 
+def tributary_areas(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The areas of a surface that its joints (n, 3) carry: (n,) on the surface, (n,) in plan.
+
+    Each has a third of every triangle of the joints' Delaunay triangulation in the plane that they
+    are nearest to; triangles with an edge longer than three times the median edge lie outside the
+    design and are left out.
+
+    Raises InputError for joints that span no surface.
+    """
+    from scipy.spatial import Delaunay, QhullError
+
+    axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2]
+    try:
+        corners = Delaunay(points @ axes[:2].T).simplices
+    except (QhullError, ValueError):
+        raise InputError("joints on a line carry no loads per area", field="loads.area") from None
+    a, b, c = (points[corners[:, k]] for k in range(3))
+    edges = np.linalg.norm(np.stack([b - a, c - b, a - c]), axis=2)
+    inside = edges.max(axis=0) <= _OUTSIDE * np.median(edges)
+    normals = 0.5 * np.cross(b - a, c - a)[inside]
+    found = []
+    for area in (np.linalg.norm(normals, axis=1), np.abs(normals[:, 2])):
+        own = np.zeros(len(points))
+        np.add.at(own, corners[inside], area[:, None] / 3)
+        found.append(own)
+    return found[0], found[1]
+
+
+def _times(factor: float, value: np.ndarray | None) -> np.ndarray | None:
+    return None if value is None else factor * value
+
+
+def _sum(first: np.ndarray | None, second: np.ndarray | None) -> np.ndarray | None:
+    if first is None or second is None:
+        return second if first is None else first
+    return first + second
+
+
 @dataclass(frozen=True)
 class LoadCase:
     """Loads on the deployed state, in the design's own axes; lists become arrays.
@@ -57,6 +97,10 @@ class LoadCase:
     joints (m,), forces (m, 3) : forces that keep their direction, and the joints that they act on
         (from 0)
     supports : (k,) joints that stay where they are, or None: those that the analysis chooses
+    line : (3,) force per rest length on every rod, or None
+    area : (3,) force per area of the target surface, such as cladding, or None
+    plan : (3,) force per area in plan, the surface seen along z, such as snow, or None; both act on
+        the joints, see `tributary_areas`
     name : as results have it
     factor : that strength and stability are asked for: loads times this. Deflections are those
         under the loads themselves
@@ -70,10 +114,13 @@ class LoadCase:
     name: str = "loads"
     factor: float = 1.0
     deflection: DeflectionLimit = DeflectionLimit()
+    line: np.ndarray | None = None
+    area: np.ndarray | None = None
+    plan: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         for name, kind in (
-            ("gravity", float),
+            *((name, float) for name in _SPREAD),
             ("joints", int),
             ("forces", float),
             ("supports", int),
@@ -83,18 +130,78 @@ class LoadCase:
                     object.__setattr__(self, name, np.asarray(value, kind))
                 except (OverflowError, TypeError, ValueError) as error:
                     raise InputError(f"expected numbers: {error}", field=f"loads.{name}") from None
+        self._check_shapes()
         if not (np.isfinite(self.factor) and self.factor > 0):
             raise InputError("must be a positive number", field="loads.factor", value=self.factor)
 
+    def _check_shapes(self) -> None:
+        for name in _SPREAD:
+            value = getattr(self, name)
+            if value is not None and not (value.shape == (3,) and np.isfinite(value).all()):
+                raise InputError(
+                    "expected three finite numbers, as [0, 0, -9.81]",
+                    field=f"loads.{name}",
+                    value=value.tolist(),
+                )
+        joints, forces = np.atleast_1d(self.joints), np.atleast_2d(self.forces)
+        if joints.ndim != 1 or forces.shape != (len(joints), 3) and (len(joints) or forces.size):
+            raise InputError(
+                f"expected a force of three numbers for each of {joints.size} joints",
+                field="loads.forces",
+                value=self.forces.tolist(),
+            )
+        if not np.isfinite(forces).all():
+            raise InputError("must be finite", field="loads.forces", value=forces.tolist())
+        object.__setattr__(self, "joints", joints)
+        object.__setattr__(self, "forces", forces.reshape(-1, 3))
+        if self.supports is not None:
+            object.__setattr__(self, "supports", np.atleast_1d(self.supports))
+
+    def __repr__(self) -> str:
+        acting = [name for name in _SPREAD if np.any(getattr(self, name))]
+        acting += [f"{len(self.joints)} forces"] if len(self.joints) else []
+        return f"<LoadCase {self.name!r}: {', '.join(acting) or 'nothing acts'}>"
+
     def times(self, factor: float) -> LoadCase:
         """The same case with all loads multiplied."""
-        gravity = None if self.gravity is None else factor * self.gravity
-        return replace(self, gravity=gravity, forces=factor * self.forces)
+        spread: dict[str, Any] = {name: _times(factor, getattr(self, name)) for name in _SPREAD}
+        return replace(self, forces=factor * self.forces, **spread)
+
+    def and_(self, other: LoadCase) -> LoadCase:
+        """Both cases' loads together; name, factor, deflection and supports are this one's.
+
+        Raises InputError where both name supports and these differ.
+        """
+        mine, its = self.supports, other.supports
+        if mine is not None and its is not None and set(mine.tolist()) != set(its.tolist()):
+            raise InputError(
+                f"{self.name} and {other.name} are held at different joints", field="supports"
+            )
+        spread: dict[str, Any] = {
+            name: _sum(getattr(self, name), getattr(other, name)) for name in _SPREAD
+        }
+        return replace(
+            self,
+            joints=np.concatenate([self.joints, other.joints]),
+            forces=np.concatenate([self.forces, other.forces]),
+            supports=its if mine is None else mine,
+            **spread,
+        )
+
+    def on_joints(self, surface: np.ndarray, plan: np.ndarray) -> np.ndarray | None:
+        """(n, 3) forces on all joints of what is given per area, for their areas (n,); None where
+        nothing is."""
+        if self.area is None and self.plan is None:
+            return None
+        nothing = np.zeros(3)
+        return np.outer(surface, nothing if self.area is None else self.area) + np.outer(
+            plan, nothing if self.plan is None else self.plan
+        )
 
     @property
     def empty(self) -> bool:
         """Whether nothing acts."""
-        return (self.gravity is None or not np.any(self.gravity)) and not np.any(self.forces)
+        return not (np.any(self.forces) or any(np.any(getattr(self, name)) for name in _SPREAD))
 
     def check(self, n_joints: int, source: Any = None) -> None:
         """Raise InputError where a joint is named that doesn't exist."""
@@ -114,7 +221,8 @@ class LoadCase:
 
 def load_cases_from_dict(data: Mapping[str, Any]) -> tuple[LoadCase, ...]:
     """The load cases of a design file's content: fields "loads" and "supports" for one case, the
-    field "load_cases" for several, as design.schema.json describes them.
+    field "load_cases" for several, "combinations" for several at once, as design.schema.json
+    describes them.
 
     The first one may have supports alone, for loads that come later. A case of the list that names
     no supports has those of the design. Raises InputError for two cases of one name, or where
@@ -133,7 +241,30 @@ def load_cases_from_dict(data: Mapping[str, Any]) -> tuple[LoadCase, ...]:
         if case.empty:
             raise InputError("nothing acts in this load case", field=f"load_cases[{number}]")
         cases.append(case)
+    for number, entry in enumerate(data.get("combinations", ())):
+        cases.append(_combination(entry, {case.name: case for case in cases}, number))
     return tuple(cases)
+
+
+def _combination(entry: Mapping[str, Any], cases: Mapping[str, LoadCase], number: int) -> LoadCase:
+    """Several cases at once, each times its factor."""
+    field_name, name = f"combinations[{number}]", entry["name"]
+    if name in cases:
+        raise InputError("a load case has this name", field=f"{field_name}.name", value=name)
+    found = LoadCase(
+        name=name,
+        factor=float(entry.get("factor", 1.0)),
+        deflection=DeflectionLimit(**entry.get("deflection", {})),
+    )
+    for case, factor in entry["factors"].items():
+        if case not in cases:
+            raise InputError(
+                f"is no load case (there are: {', '.join(cases) or 'none'})",
+                field=f"{field_name}.factors",
+                value=case,
+            )
+        found = found.and_(cases[case].times(float(factor)))
+    return found
 
 
 def _case(loads: Mapping[str, Any], supports: Any, name: str) -> LoadCase:
@@ -147,4 +278,7 @@ def _case(loads: Mapping[str, Any], supports: Any, name: str) -> LoadCase:
         name,
         float(loads.get("factor", 1.0)),
         DeflectionLimit(**loads.get("deflection", {})),
+        loads.get("line"),
+        loads.get("area"),
+        loads.get("plan"),
     )

@@ -15,7 +15,7 @@ from kop_exudyn.errors import InputError
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.structures.base import design_from_dict
 from kop_exudyn.structures.loading import loaded_state, supports_of
-from kop_exudyn.structures.loads import LoadCase
+from kop_exudyn.structures.loads import LoadCase, tributary_areas
 from kop_exudyn.structures.strength import materials_of
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
@@ -72,6 +72,98 @@ def test_forces_and_displacements_are_reciprocal(dome, opened):
     there, back = moved(40, 2, 13, 0), moved(13, 0, 40, 2)
     assert abs(there) > 1e-6
     assert there == pytest.approx(back, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        LoadCase(GRAVITY),
+        LoadCase(joints=[40, 30], forces=[[0, 0, -0.5], [0.2, 0, 0]]),
+        LoadCase(line=[0, 0, -0.05], plan=[0, 0.1, -0.3]),
+        LoadCase(area=[0.05, 0, -0.2]),
+    ],
+    ids=lambda case: case.name,
+)
+def test_reactions_balance_the_loads(dome, opened, case):
+    """Forces and moments: those of the supports and those of the loads add up to nothing."""
+    found = loaded_state(dome, opened, case)
+    assert found.reactions.shape == (len(found.supports), 3)
+    scale = np.linalg.norm(found.reactions, axis=1).sum()
+    np.testing.assert_allclose(
+        found.reactions.sum(axis=0) + found.total_force, 0, atol=1e-7 * scale
+    )
+    if len(case.joints):
+        x = found.equilibrium.state.positions[dome.joints]
+        moment = np.cross(x[found.supports], found.reactions).sum(axis=0)
+        moment += np.cross(x[case.joints], case.forces).sum(axis=0)
+        np.testing.assert_allclose(moment, 0, atol=1e-6 * scale)
+
+
+def test_what_is_spread_adds_up(dome, opened):
+    """A line load is the rods' length times it, loads per area are the target's areas times
+    them."""
+    length = dome.scene().rest_lengths(dome.parameters).sum()
+    line = loaded_state(dome, opened, LoadCase(line=[0, 0, -0.02])).total_force
+    assert line == pytest.approx([0, 0, -0.02 * length])
+    surface, plan = tributary_areas(dome.target.positions)
+    for case, areas in (
+        (LoadCase(area=[0, 0, -0.1]), surface),
+        (LoadCase(plan=[0, 0, -0.1]), plan),
+    ):
+        total = loaded_state(dome, opened, case).total_force
+        assert total == pytest.approx([0, 0, -0.1 * areas.sum()])
+    assert plan.sum() < surface.sum() < 1.5 * plan.sum()
+
+
+def test_areas_of_joints():
+    """On a tilted grid of squares: corners a quarter, edges a half, middles one, up to the
+    triangulation's choice of diagonals; nothing over a gap."""
+    x, y = np.meshgrid(np.arange(6.0), np.arange(5.0))
+    slope = np.radians(30)
+    points = np.stack([x * np.cos(slope), y, x * np.sin(slope)], axis=-1).reshape(-1, 3)
+    surface, plan = tributary_areas(points)
+    assert surface.sum() == pytest.approx(20) and plan.sum() == pytest.approx(20 * np.cos(slope))
+    assert surface.min() >= 1 / 6 - 1e-9
+    np.testing.assert_allclose(plan, np.cos(slope) * surface)
+    apart = np.concatenate([points, points + [0, 40, 0]])
+    assert tributary_areas(apart)[0].sum() == pytest.approx(40)
+    with pytest.raises(InputError, match="on a line"):
+        tributary_areas(np.arange(12.0)[:, None] * [1.0, 0, 0])
+
+
+@pytest.mark.parametrize(
+    "fields, message",
+    [
+        ({"gravity": 9.81}, "loads.gravity = 9.81: expected three"),
+        ({"line": [0, np.nan, 1]}, "loads.line.*expected three finite"),
+        ({"joints": [1, 2], "forces": [[0, 0, 1]]}, "loads.forces.*each of 2 joints"),
+        ({"joints": [1], "forces": [0, 0, np.inf]}, "loads.forces.*finite"),
+        ({"forces": [[0, 0, 1.0]]}, "loads.forces.*each of 0 joints"),
+        ({"joints": "one"}, "loads.joints: expected numbers"),
+    ],
+)
+def test_load_cases_say_what_is_wrong_with_them(fields, message):
+    with pytest.raises(InputError, match=message):
+        LoadCase(**fields)
+
+
+def test_combinations(c_shell_data):
+    """Factored sums of other cases; unknown names and supports that differ are refused."""
+    cases = [
+        {"name": "snow", "plan": [0, 0, -2.0]},
+        {"name": "lamp", "points": [{"joint": 1, "force": [0, 0, -3.0]}]},
+    ]
+    both = {"name": "both", "factors": {"snow": 1.5, "lamp": 2}, "factor": 1.1}
+    design = design_from_dict(c_shell_data | {"load_cases": cases, "combinations": [both]})
+    found = {case.name: case for case in design.load_cases}["both"]
+    assert found.plan.tolist() == [0, 0, -3] and found.forces.tolist() == [[0, 0, -6]]
+    assert found.factor == 1.1 and not found.empty
+    wrong = {"name": "wrong", "factors": {"wind": 1}}
+    with pytest.raises(InputError, match=r"combinations\[0\].factors = 'wind': is no load case"):
+        design_from_dict(c_shell_data | {"load_cases": cases, "combinations": [wrong]})
+    held = [case | {"supports": list(range(k, k + 3))} for k, case in enumerate(cases)]
+    with pytest.raises(InputError, match="held at different joints"):
+        design_from_dict(c_shell_data | {"load_cases": held, "combinations": [both]})
 
 
 def test_a_force_on_a_support_changes_nothing(dome, opened):
