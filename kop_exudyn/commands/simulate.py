@@ -180,12 +180,8 @@ def _under_load(loaded: dict, units: Units | None) -> dict[str, str]:
     )
     return {
         "load": f"{force} in all, held at {len(loaded['supports'])} joints",
-<<<<<<< HEAD
-        "deflection": f"max {largest} ({deflection['max_percent']:.3g} % of the size), "
-=======
         **reactions,
-        "deflection": f"max {largest} ({deflection['max_percent']:.3g} % of the diagonal), "
->>>>>>> f5bc18d (Loads per length and area, combinations, reactions; load cases say what is wrong with them)
+        "deflection": f"max {largest} ({deflection['max_percent']:.3g} % of the size), "
         f"mean {mean} ({deflection['mean_percent']:.3g} %)",
         "stress, loaded": _stress(loaded["strength"], units),
         "stable, loaded": "yes" if loaded["stable"] else "no",
