@@ -37,8 +37,8 @@ class Station:
     name : as messages and results have it
     scene : name of the scene that it is a state of, see `Design.systems`
     opening : rad, prescribed mean hinge angle, or None without actuation
-    lifted : shape that the builder lifts the assembly to at this station before it is let go, where
-        it lies flat until then, or None; stations after one that has a shape have one, too
+    lifted : shape that the builder lifts the assembly to at this station before it is let go, or
+        None; stations after one that has a shape have one, too, for what falls back flat
     """
 
     name: str
@@ -85,9 +85,9 @@ class Way:
         found: list[Equilibrium] = []
         before: Start | Equilibrium = assembled
         opening = self.opening
-        for station in (*self.stations, self.deployed):
+        for number, station in enumerate((*self.stations, self.deployed)):
             system, steps = systems[station.scene], [station.opening]
-            if station.lifted is not None and self.is_flat(before.state):
+            if station.lifted is not None and self._is_lifted(number, before.state):
                 before, opening = station.lifted, None
             if opening is not None and station.opening is not None:
                 steps = [0.5 * (opening + station.opening), station.opening]
@@ -142,11 +142,13 @@ class Way:
         """The states at the stations, each led to in so many steps, and where they lead to."""
         found: list[Equilibrium] = []
         stations = (*self.stations, self.deployed)
-        first = next((k for k, s in enumerate(stations) if s.lifted is not None), 0)
+        first = self._first
         for number, (station, near) in enumerate(zip(stations, (*known, deployed))):
             try:
-                lifted = station.lifted is not None and (not found or self.is_flat(found[-1].state))
-                if number >= max(first, 1) and not lifted:
+                lifted = station.lifted is not None and (
+                    number == first or self._is_lifted(number, found[-1].state)
+                )
+                if number > first and not lifted:
                     before = systems[self.stations[number - 1].scene]
                     found.append(_led(before, systems[station.scene], q, found[-1], station, parts))
                 else:
@@ -154,6 +156,18 @@ class Way:
             except SimulationFailure as failure:
                 raise failure.within(station.name) from None
         return found
+
+    @property
+    def _first(self) -> int:
+        """The station at which the assembly is lifted first; that at the beginning where it isn't
+        lifted."""
+        stations = (*self.stations, self.deployed)
+        return next((k for k, s in enumerate(stations) if s.lifted is not None), 0)
+
+    def _is_lifted(self, number: int, before: State) -> bool:
+        """Whether the assembly is lifted at a station that has a shape for that: at the first one
+        in any case, as it may have risen to the wrong side; then while it falls back."""
+        return number == self._first or self.is_flat(before)
 
     def is_flat(self, state: State) -> bool:
         """Whether all joints lie in one plane."""

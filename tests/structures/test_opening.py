@@ -100,9 +100,9 @@ def test_it_is_lifted_until_it_stays_up(shell, states):
     assert way.apart(other.followed(shell.systems, q, found[:-1], found[-1])[-1], found[-2]) < 1e-6
 
 
-def test_what_rises_by_itself_is_not_lifted(repository):
-    """Of parts that don't suit it a shell is up before the station at which it would be lifted;
-    opening it and following its way agree."""
+def test_what_rises_too_early_is_lifted_to_its_side(repository):
+    """Of parts that don't suit it a shell is up before the station at which it is lifted, perhaps
+    to the wrong side; opening it and following its way agree."""
     design = load_design(repository / "models" / "small" / "06_moebius.json")
     found = cluster(design.groups, design.parameters, {"linear": 2, "angular": 1})
     q = found.assignment.matrix(found.kit) @ found.kit.vector
