@@ -45,8 +45,8 @@ class OwnProblem:
 
     def derivatives(self, point: Point) -> Derivatives:
         found = self.objective.derivatives(point.data)
-        confirmed = replace(point, data=found.evaluation)
-        return Derivatives(found.gradient, sp.csc_matrix(found.hessian), point=confirmed)
+        refined = replace(point, data=found.evaluation)
+        return Derivatives(found.gradient, sp.csc_matrix(found.hessian), point=refined)
 
 
 def fit_input(

@@ -103,7 +103,7 @@ class Evaluation:
     terms : its weighted parts by name ("fit", "energy ROLE", ...)
     fit : target fitting of the joints
     equilibria : by role
-    confirmations : Exudyn's, by role; empty until the point is kept
+    confirmations : Exudyn's, by role; empty until a result is made of it
     iterations, solves : Newton iterations and equilibria that it took
     utilisation : by state, the largest equivalent stress over what is allowed; empty where stress
         is not bounded. States are the roles, and the stations of the way that are known; under
@@ -134,7 +134,7 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class DesignDerivatives:
-    """Gradient (nq,) and model Hessian (nq, nq; None when not asked for) of F, and the confirmed
+    """Gradient (nq,) and model Hessian (nq, nq; None when not asked for) of F, and the refined
     evaluation.
 
     seconds : by phase, for profiles
@@ -308,11 +308,10 @@ class DesignObjective:
         return float(np.linalg.norm(x - y, axis=1).max()) / a.fit.size
 
     def derivatives(self, evaluation: Evaluation, hessian: bool = True) -> DesignDerivatives:
-        """Confirm the evaluation's states with Exudyn, then differentiate F at Exudyn's states."""
+        """Differentiate F at the evaluation's states, converged to round-off; Exudyn's, where it
+        has confirmed them."""
         begin = perf_counter()
-        evaluation = self.confirm(evaluation)
-        exudyn_s = perf_counter() - begin
-        begin = perf_counter()
+        evaluation = self._refined(evaluation)
         gradient = np.zeros(len(evaluation.q))
         model = np.zeros((len(evaluation.q),) * 2) if hessian else None
         bounds = {}
@@ -337,7 +336,7 @@ class DesignObjective:
                     gradient += weight * slope
                     model += weight * curvature
         bounds |= self._bounds_on_the_way(evaluation)
-        seconds = {"exudyn": exudyn_s, "sensitivities": perf_counter() - begin}
+        seconds = {"sensitivities": perf_counter() - begin}
         return DesignDerivatives(gradient, model, evaluation, seconds, bounds)
 
     def _bounds_on_the_way(self, evaluation: Evaluation) -> dict[str, Rows]:
@@ -357,10 +356,11 @@ class DesignObjective:
         confirm one."""
         if evaluation.confirmations:
             return evaluation
+        evaluation = self._refined(evaluation)
         confirmations, equilibria = {}, {}
         for role in self.design.roles:
             name = role.name
-            refined = refine(self.design.systems[name], evaluation.equilibria[name])
+            refined = evaluation.equilibria[name]
             try:
                 confirmations[name] = confirm(
                     self.design.scene(name), refined, evaluation.q, role.opening
@@ -369,6 +369,16 @@ class DesignObjective:
                 raise failure.within(f"{self.design.name}: {name} state") from None
             equilibria[name] = replace(refined, state=confirmations[name].state)
         return replace(evaluation, equilibria=equilibria, confirmations=confirmations)
+
+    def _refined(self, evaluation: Evaluation) -> Evaluation:
+        """The same evaluation with its states converged to round-off."""
+        if evaluation.confirmations:
+            return evaluation
+        equilibria = {
+            name: refine(self.design.systems[name], state)
+            for name, state in evaluation.equilibria.items()
+        }
+        return replace(evaluation, equilibria=equilibria)
 
     def follow(self, q: np.ndarray, previous: Evaluation, steps: int) -> list[Evaluation]:
         """Evaluations along the straight path from a previous one to q, in equal steps, each

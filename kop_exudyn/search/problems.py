@@ -24,8 +24,8 @@ from .objective import DesignDerivatives, Evaluation
 class DatasetPoint:
     """What the problems keep with a point.
 
-    evaluations : of all designs; Exudyn's once derivatives were taken there
-    solved : of all designs, as they were found first: a resumed run confirms and goes on from the
+    evaluations : of all designs; converged to round-off once derivatives were taken there
+    solved : of all designs, as they were found first: a resumed run refines and goes on from the
         same states
     kit, assignment : nearest to the point (relaxed), or that the point is made of (assigned)
     terms : the objective's terms by name, summed over designs
@@ -40,7 +40,7 @@ class DatasetPoint:
     solved: list[Evaluation]
     bounds: list[tuple[str, str]] = field(default_factory=list)
 
-    def confirmed(
+    def refined(
         self, designs: Sequence[DesignDerivatives], bounds: list[tuple[str, str]]
     ) -> DatasetPoint:
         """The same with the evaluations at which derivatives were taken, and the bounds there."""
@@ -96,7 +96,7 @@ class RelaxedProblem:
         data: DatasetPoint = point.data
         designs = self.dataset.derivatives(data.evaluations, hessian=True)
         names, bounds = _bounds(self.dataset, designs)
-        confirmed = replace(point, data=data.confirmed(designs, names))
+        refined = replace(point, data=data.refined(designs, names))
         weights = self.dataset.design_weights
         own = np.concatenate([w * d.gradient for w, d in zip(weights, designs)])
         gradient = own + self.projection.gradient(point.x, data.kit, data.assignment)
@@ -105,18 +105,18 @@ class RelaxedProblem:
         added, extra = self.rule.model(quadratic)
         if extra is None:
             whole = hessian if added is None else sp.csc_matrix(hessian + added)
-            return Derivatives(gradient, whole, inequalities=bounds, point=confirmed)
-        return Derivatives(gradient, hessian, extra, own, bounds, confirmed)
+            return Derivatives(gradient, whole, inequalities=bounds, point=refined)
+        return Derivatives(gradient, hessian, extra, own, bounds, refined)
 
     def first_derivatives(self, point: Point) -> Derivatives:
         """The gradient alone: one adjoint solve a state instead of all sensitivities."""
         data: DatasetPoint = point.data
         designs = self.dataset.derivatives(data.evaluations, hessian=False)
         names, bounds = _bounds(self.dataset, designs)
-        confirmed = replace(point, data=data.confirmed(designs, names))
+        refined = replace(point, data=data.refined(designs, names))
         own = np.concatenate([w * d.gradient for w, d in zip(self.dataset.design_weights, designs)])
         gradient = own + self.projection.gradient(point.x, data.kit, data.assignment)
-        return Derivatives(gradient, inequalities=bounds, point=confirmed)
+        return Derivatives(gradient, inequalities=bounds, point=refined)
 
 
 class AssignedProblem:
@@ -198,7 +198,7 @@ class AssignedProblem:
         data: DatasetPoint = point.data
         designs = self.dataset.derivatives(data.evaluations, hessian=True)
         names, bounds = _bounds(self.dataset, designs, self.matrix)
-        confirmed = replace(point, data=data.confirmed(designs, names))
+        refined = replace(point, data=data.refined(designs, names))
         gradient, hessian = np.zeros(self.n), np.zeros((self.n, self.n))
         for weight, d, start, end in zip(
             self.dataset.design_weights, designs, self.dataset.offsets, self.dataset.offsets[1:]
@@ -209,18 +209,18 @@ class AssignedProblem:
         unused = np.flatnonzero(np.abs(hessian).sum(axis=1) == 0)
         # parts that nothing uses stay where they are
         hessian[unused, unused] = np.abs(hessian.diagonal()).mean()
-        return Derivatives(gradient, sp.csc_matrix(hessian), inequalities=bounds, point=confirmed)
+        return Derivatives(gradient, sp.csc_matrix(hessian), inequalities=bounds, point=refined)
 
     def first_derivatives(self, point: Point) -> Derivatives:
         """The gradient alone, as in `RelaxedProblem`."""
         data: DatasetPoint = point.data
         designs = self.dataset.derivatives(data.evaluations, hessian=False)
         names, bounds = _bounds(self.dataset, designs, self.matrix)
-        confirmed = replace(point, data=data.confirmed(designs, names))
+        refined = replace(point, data=data.refined(designs, names))
         weighted = np.concatenate(
             [w * d.gradient for w, d in zip(self.dataset.design_weights, designs)]
         )
-        return Derivatives(self.matrix.T @ weighted, inequalities=bounds, point=confirmed)
+        return Derivatives(self.matrix.T @ weighted, inequalities=bounds, point=refined)
 
     def _limit_by_designs(self) -> None:
         """An element's own bounds are its part's: entries of M are +-1, one a row."""

@@ -213,7 +213,8 @@ def summary_of(
         "elastic_energy": energy,
         "energy_ratio": energy / reference.energy,
         "stable": all(eq.stable for eq in outcome.equilibria.values()),
-        "exudyn": outcome.confirmations[role].to_dict(),
+        "exudyn": outcome.confirmations[role].to_dict() if outcome.confirmations else None,
+        "confirmed": sorted(outcome.confirmations),
         "strength": strength_summary(design, outcome.equilibria),
     }
 

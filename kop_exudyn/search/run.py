@@ -126,6 +126,7 @@ def optimize_kit(
         announce("deployment of the assigned designs")
         found["assigned"] = opened_stage(stages, found["assigned"], result.at_parts)
         result.seconds["search"] = perf_counter() - begin_search
+        found.update({stage: _confirmed(stages, outcome) for stage, outcome in found.items()})
         result.redeployed = stages.redeployed(found["assigned"])
         if "direct" in found:
             announce("bound on the clustering")
@@ -141,6 +142,15 @@ def optimize_kit(
     result.wall_s = perf_counter() - begin
     result.settings = described_job(designs, parts, kit, settings) | {"jobs": settings.jobs}
     return result
+
+
+def _confirmed(stages: Stages, outcome: StageResult) -> StageResult:
+    """What a stage left, at Exudyn's solutions: the steps of its optimisation aren't confirmed.
+
+    The objective is as the stage has it, of the relaxed one with the projection's energy.
+    """
+    found = stages.confirmed(outcome)
+    return found if found.value is None else replace(found, value=outcome.value)
 
 
 def check_request(

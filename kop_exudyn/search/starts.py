@@ -114,7 +114,7 @@ def model_starts(
     found: list[StageResult] = []
     for base in bases:
         derivatives = stages.dataset.derivatives(list(base), hessian=True)
-        confirmed = [d.evaluation for d in derivatives]
+        refined = [d.evaluation for d in derivatives]
         for damping in _DAMPINGS:
             model = LocalModel.of(
                 derivatives,
@@ -124,14 +124,14 @@ def model_starts(
             )
             for start in _best_under(stages, model, options):
                 built = stages.built_from(
-                    start.kit, start.assignment, confirmed, start.free,
+                    start.kit, start.assignment, refined, start.free,
                     (stages.settings.path_steps + 1) // 2,
                 )  # fmt: skip
                 log.info(
                     "a start under the model (damping %g): J = %s, predicted %.5g",
                     damping,
                     built.value,
-                    sum(e.value for e in confirmed) + start.predicted.sum(),
+                    sum(e.value for e in refined) + start.predicted.sum(),
                 )
                 found.append(built)
     whole = [built for built in found if built.value is not None]

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from support.zigzags import Zigzag, zigzags
 
-from kop_exudyn.errors import InputError
+from kop_exudyn.equilibrium.exudyn_confirm import confirm
+from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.io.checkpoint import CheckpointStore
 from kop_exudyn.io.kits import load_kit
 from kop_exudyn.io.results import load_result, load_states
@@ -167,6 +168,34 @@ def test_killed_and_resumed_gives_the_same(finished, tmp_path, monkeypatch):
         for folder in (out, tmp_path / "out")
     )
     assert first == second
+
+
+def test_the_result_names_the_confirmed_states(finished):
+    """All of them, in all stages; not those of steps, which aren't in it."""
+    data = json.loads((finished[1] / "result.json").read_text(encoding="utf-8"))
+    result = finished[0]
+    for design, written in zip(result.designs, data["designs"]):
+        for stage in result.stages:
+            assert written[stage]["confirmed"] == sorted(role.name for role in design.roles)
+            assert written[stage]["exudyn"]["moved"] < 1e-6
+
+
+def test_a_stage_that_exudyn_refuses_is_a_failure_of_the_result(monkeypatch):
+    """Its states were good enough to go on from, which doesn't make them results."""
+    designs, asked = zigzags(), []
+
+    def refusing(scene, equilibrium, q, opening):
+        asked.append(q)
+        if any(scene is designs[0].scene(role.name) for role in designs[0].roles):
+            raise SimulationFailure("Exudyn refuses the state")
+        return confirm(scene, equilibrium, q, opening)
+
+    monkeypatch.setattr("kop_exudyn.search.objective.confirm", refusing)
+    result = optimize_kit(designs, {"linear": 4, "angular": 3}, settings=SETTINGS)
+    for stage in result.stages:
+        assert "Exudyn refuses" in result.summary(stage, 0)["failed"]
+        assert result.summary(stage, 1)["confirmed"]
+    assert asked
 
 
 def test_designs_from_a_kit_that_exists(finished, tmp_path):
