@@ -172,7 +172,7 @@ def promised(runs: int, released: Path, largest: dict, faster: list, quick: bool
     """The table of goals; the quick one has those that take a moment only."""
     shell = load_design(MODELS / ("small" if quick else "conformals") / "03_exp.json")
     table = [
-        *goals.newton_iteration(runs, 5 if quick else 17),
+        goals.newton_iteration(runs, 5 if quick else 17),
         goals.full_sensitivities(shell, runs),
         goals.goal(
             "memory of the largest gridshell",

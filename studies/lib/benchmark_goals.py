@@ -133,8 +133,8 @@ def large_c_shell(data: Mapping[str, Any], runs: int) -> Row:
     return goal("C-shell of 142 joints or more opened", _OPENING_S, "s", timing.median, note)
 
 
-def newton_iteration(runs: int, joints: int = 17) -> list[Row]:
-    """One Newton iteration at 8,000 unknowns, and the factorisation's share."""
+def newton_iteration(runs: int, joints: int = 17) -> Row:
+    """One Newton iteration at 8,000 unknowns; the note says what its time goes into."""
     scene, q = gridshell(joints, 3, 1e-3)
     system = System(scene)
     solve(system, q)
@@ -144,25 +144,17 @@ def newton_iteration(runs: int, joints: int = 17) -> list[Row]:
     wall = sum(solve(system, q).wall_s for _ in range(runs))
     note = (
         f"{system.n_unknowns} unknowns, {len(scene.elements)} elements, "
-        f"{timing.value.iterations} iterations"
+        f"{timing.value.iterations} iterations; of the time assembly "
+        f"{count.assembly_s / wall:.2f}, factorisation {count.factorisation_s / wall:.2f}, "
+        f"triangular solves {count.solve_s / wall:.2f}"
     )
-    return [
-        goal(
-            "Newton iteration at 8,000 unknowns",
-            0.01,
-            "s",
-            timing.median / timing.value.iterations,
-            note,
-        ),
-        goal(
-            "share of the factorisation in it",
-            0.5,
-            "of the time",
-            count.factorisation_s / wall,
-            f"assembly {count.assembly_s / wall:.2f}, triangular solves {count.solve_s / wall:.2f}",
-            at_least=True,
-        ),
-    ]
+    return goal(
+        "Newton iteration at 8,000 unknowns",
+        0.01,
+        "s",
+        timing.median / timing.value.iterations,
+        note,
+    )
 
 
 def full_sensitivities(design: Design, runs: int) -> Row:
