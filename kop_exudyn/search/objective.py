@@ -207,9 +207,9 @@ class DesignObjective:
         equilibria = {}
         for role in self.design.roles:
             try:
-                equilibria[role.name] = self._solve(
-                    role.name, q, starts[role.name], role.opening, options
-                )
+                found = self._solve(role.name, q, starts[role.name], role.opening, options)
+                self.design.check_state(role.name, found.state)
+                equilibria[role.name] = found
             except SimulationFailure as failure:
                 raise failure.within(f"{self.design.name}: {role.name} state") from None
         return self.judge(q, equilibria)
@@ -240,6 +240,7 @@ class DesignObjective:
             *way, deployed = self._way.opened(
                 design.systems, q, design.assembled(q, evaluation.equilibria)
             )
+            design.check_state(role, deployed.state)
         except SimulationFailure as failure:
             raise failure.within(f"{design.name}: on its way from the assembly") from None
         if self._way.apart(deployed, evaluation.equilibria[role]) <= SAME_STATE:

@@ -131,6 +131,10 @@ class Design(ABC):
         Raises SimulationFailure when one of them can't be reached.
         """
 
+    def check_state(self, role: str, state: State) -> None:  # noqa: B027
+        """Raise SimulationFailure for an equilibrium of a role that no structure can have, say as
+        its rods would pass through each other. By default there is none."""
+
     @cached_property
     @abstractmethod
     def target(self) -> Target:

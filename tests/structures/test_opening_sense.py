@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from kop_exudyn.analysis.simulation import simulate
 from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.geometry.network import network_from_dict
+from kop_exudyn.io.designs import load_design
+from kop_exudyn.search.objective import DesignObjective
 from kop_exudyn.structures.base import design_from_dict
 
 
@@ -124,3 +126,20 @@ def test_a_dangling_lath_is_named():
         InputError, match=r"curves\[8\]: turns about .* without the rest of the net"
     ):
         design_from_dict(copy.deepcopy(data))
+
+
+def test_searches_do_not_pass_through_states_with_laths_through_each_other(repository):
+    """Elements far from the input's have an equilibrium in which a hinge has turned beyond closed:
+    a failed trial, which names the hinge."""
+    design = load_design(repository / "models" / "small" / "03_exp.json")
+    rng = np.random.default_rng(9)
+    q = design.parameters * (1 + 0.1 * rng.normal(size=len(design.parameters)))
+    objective = DesignObjective(design)
+    with pytest.raises(SimulationFailure, match=r"deployed state: the hinge of curves\[0\] and"):
+        objective.evaluate(q)
+    design.check_state = lambda role, state: None  # as if none of its states were checked
+    state = objective.evaluate(q).equilibria[design.fitted_role.name].state
+    angles = state.angles[: design.network.n_joints]
+    assert angles.min() < 0 or angles.max() > np.pi
+    near = design.parameters * (1 + 1e-3 * rng.normal(size=len(design.parameters)))
+    assert objective.evaluate(near).fit.max_percent < 1

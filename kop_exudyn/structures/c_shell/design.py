@@ -35,6 +35,7 @@ from ...geometry.network_faces import triangulate
 from ...geometry.triangles import TriangleSurface
 from ...rods.sections import material_from_dict, section_from_dict
 from ...scene.scene import Scene
+from ...scene.state import State
 from ..base import (
     Design,
     Role,
@@ -154,25 +155,26 @@ class CShell(Design):
         """Rest from the flat network; deployed from there, as a builder opens it.
 
         Where no equilibrium is found on that way, the input's deployed state is the one that the
-        smooth design's leads to. Hinges are checked in the input's states alone: a search passes
-        through others.
+        smooth design's leads to.
         """
         solve, path = (fast, self.smooth_path) if solve is None else (solve, [])
         given, q = q is not None, self.parameters if q is None else q
         try:
             start = Start(self.scene("rest").initial)
             rest = solve(self.systems["rest"], q, start, self._rest_opening)
-            if not given:
-                check_hinges(self.network, rest.state)
+            self.check_state("rest", rest.state)
         except SimulationFailure as failure:
             raise failure.within("rest state") from None
         try:
             deployed = (self._opened if given else self._opened_or_led)(q, rest, solve)
-            if not given:
-                check_hinges(self.network, deployed.state)
+            self.check_state("deployed", deployed.state)
         except SimulationFailure as failure:
             raise failure.within("deployed state") from None
         return {"deployed": deployed.after(*path), "rest": rest}
+
+    def check_state(self, role: str, state: State) -> None:
+        """See `check_hinges`."""
+        check_hinges(self.network, state)
 
     def _opened(self, q: np.ndarray, rest: Equilibrium, solve: Solve) -> Equilibrium:
         opened = self.way.opened(self.systems, q, self.assembled(q, {"rest": rest}), solve)
