@@ -136,7 +136,6 @@ def parts(shells, clustering):
 # an entry goes when its fault does.
 KNOWN_FAULTS = {
     "test_commands_print_what_the_page_shows": "the page's figures wait for another run",
-    "test_quick_failure_and_rescue": "nothing snaps in the quick cases with the present models",
 }
 
 

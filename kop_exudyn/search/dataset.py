@@ -30,10 +30,12 @@ _EQUILIBRIUM_NUMBERS = ("torque", "elastic_energy", "potential", "residual")
 
 @dataclass
 class Tally:
-    """What a run has cost so far: equilibria solved, and Newton iterations in them."""
+    """What a run has cost so far: equilibria solved, Newton iterations in them, and seconds that
+    Exudyn took to confirm states, in all processes."""
 
     equilibria: int = 0
     newton_iterations: int = 0
+    confirmation_s: float = 0.0
 
     def add(self, evaluation: Evaluation) -> None:
         self.equilibria += evaluation.solves
@@ -204,7 +206,13 @@ class Dataset:
         self, evaluations: Mapping[int, Evaluation]
     ) -> dict[int, Evaluation | SimulationFailure]:
         """Exudyn's word on some designs."""
-        return self._map(DesignObjective.confirm, {n: (e,) for n, e in evaluations.items()})
+        calls = {n: (e,) for n, e in evaluations.items() if not e.confirmations}
+        found = self._map(DesignObjective.confirm, calls)
+        for evaluation in found.values():
+            if isinstance(evaluation, Evaluation):
+                said = evaluation.confirmations.values()
+                self.tally.confirmation_s += sum(confirmation.wall_s for confirmation in said)
+        return {n: found.get(n, evaluation) for n, evaluation in evaluations.items()}
 
     def redeploy(
         self, q: np.ndarray, members: Sequence[int]

@@ -42,7 +42,8 @@ class KitResult:
         (`Evaluation.utilisation`); empty where it wasn't computed
     clustering : by kind, how far the parts that the search began with are from the best clustering
         of the input elements
-    seconds : wall time of "search" (both stages) and, where that was asked for, "published"
+    seconds : wall time of "search" (both stages) and, where that was asked for, "published"; of
+        "confirmation" by Exudyn the sum over all processes
     tried : starts of the assigned stage, and what came of them
     buildable : by design, whether it can be built from the kit and what stops it, as plain data;
         empty where that was not looked at

@@ -139,6 +139,7 @@ def optimize_kit(
         result.peak_memory_mb = pool.peak_memory_mb()
     result.equilibria = dataset.tally.equilibria
     result.newton_iterations = dataset.tally.newton_iterations
+    result.seconds["confirmation"] = dataset.tally.confirmation_s
     result.wall_s = perf_counter() - begin
     result.settings = described_job(designs, parts, kit, settings) | {"jobs": settings.jobs}
     return result

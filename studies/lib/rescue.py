@@ -18,9 +18,15 @@ from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.report.designs import DrawnState
 from kop_exudyn.report.kit_drawings import drawn_state
+from kop_exudyn.search.dataset import Dataset
+from kop_exudyn.search.objective import Weights
+from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.stage_results import StageEvent, StageResult
+from kop_exudyn.search.stages import Stages
+from kop_exudyn.structures.base import Design
 
-from .watched_path import watch_one
+from .watched_path import WatchedPath, watch
 
 Case = Mapping[str, Any]
 
@@ -31,18 +37,47 @@ def path_case(
     weight: float,
     relaxed_steps: int,
     path_steps: int,
+    seed: int,
 ) -> dict[str, Any]:
-    """One design relaxed at one w_c and followed to its parts, as plain data.
+    """One design relaxed at one w_c and followed to its parts, as plain data; where it snaps or
+    finds no equilibrium, "rescue" is what the search's own rule makes of it.
 
-    design : its file; parts : kind -> number; weight : w_c
+    design : its file; parts : kind -> number; weight : w_c; seed : of the clustering
     """
     subject = load_design(design)
     settings = StageSettings(
-        schedule=(weight,), relaxed_steps=relaxed_steps, path_steps=path_steps, reassignments=0
+        schedule=(weight,),
+        relaxed_steps=relaxed_steps,
+        path_steps=path_steps,
+        reassignments=0,  # else the search leaves snaps to its rounds
+        seed=seed,
     )
-    path, relaxed = watch_one(subject, dict(parts), settings)
+    with DesignPool([subject], 1) as pool:
+        pool.prepare()
+        dataset = Dataset.of_pool(pool, Weights.suiting([subject]))
+        attempts: dict[str, float] = {}
+
+        def observe(event: StageEvent) -> None:
+            if event.weight is not None:
+                attempts[event.sqp] = event.weight
+
+        stages = Stages(dataset, dict(parts), settings, observer=observe)
+        relaxed = stages.relaxed(stages.direct().kit)
+        case = _followed(subject, watch(dataset, relaxed, path_steps)[0], relaxed, weight)
+        if not fails(case):
+            return case
+        attempts.clear()
+        rescued, _ = stages.to_parts(relaxed)
+        path = watch(dataset, rescued, path_steps)[0]
+        reached = max(attempts.values(), default=weight)
+        return case | {"rescue": _followed(subject, path, rescued, reached)}
+
+
+def _followed(
+    subject: Design, path: WatchedPath | SimulationFailure, relaxed: StageResult, weight: float
+) -> dict[str, Any]:
     case: dict[str, Any] = {
-        "parts": dict(parts),
+        "parts": dict(relaxed.kit.sizes),
         "weight": weight,
         "relaxed %": relaxed.evaluations[0].fit.max_percent,
     }
@@ -53,6 +88,7 @@ def path_case(
         "snapped": path.jump is not None,
         "snap at": path.jump and path.jump.fraction,
         "snap %": path.jump and 100 * path.jump.distance,
+        "largest move %": float(path.moves_percent.max()),
         "moves %": path.moves_percent,
         "energies": path.energies,
         "deviations %": path.deviations_percent,
@@ -61,6 +97,56 @@ def path_case(
             "at the parts": _plain(drawn_state(subject, path.states[-1], "")),
         },
     }
+
+
+def fails(case: Case) -> bool:
+    """Whether a design snaps on its way, or has no equilibrium somewhere on it."""
+    return bool(case["snapped"]) or "no equilibrium" in case
+
+
+def example(cases: Sequence[Case]) -> Case | None:
+    """The case to show: of those that snap the one with the largest snap; where none does, that
+    with the largest move in one step. None where no case has a whole path."""
+    snapped = [case for case in cases if case["snapped"]]
+    whole = [case for case in cases if "at the parts %" in case]
+    return max(snapped or whole, key=lambda case: case["largest move %"], default=None)
+
+
+def finding_of(cases: Sequence[Case]) -> str:
+    """What came of all cases, in words."""
+    failed = [case for case in cases if fails(case)]
+    if not failed:
+        return (
+            f"In none of {len(cases)} cases does the design snap or lose its equilibrium on the "
+            "way to its parts: there is nothing to rescue."
+        )
+    without = sum("no equilibrium" in case for case in failed)
+    saved = sum(not fails(case["rescue"]) for case in failed)
+    text = (
+        f"In {len(failed)} of {len(cases)} cases the design fails on the way to its parts "
+        f"({len(failed) - without} snap, {without} find no equilibrium); raising w_c as the search "
+        f"does rescues {saved} of them."
+    )
+    shown = example(cases)
+    if shown is None or not shown["snapped"]:
+        return text
+    text += (
+        f" With {_in_words(shown)} a joint jumps {shown['snap %']:.0f} % of the box at "
+        f"{shown['snap at']:.0%} of the way, and the design ends {shown['at the parts %']:.1f} % "
+        "off"
+    )
+    rescue = shown["rescue"]
+    if fails(rescue):
+        return f"{text}; {_in_words(rescue)} don't keep it from that."
+    return (
+        f"{text}; with {_in_words(rescue)} it stays in its state and ends "
+        f"{rescue['at the parts %']:.1f} % off."
+    )
+
+
+def _in_words(case: Case) -> str:
+    sizes = " and ".join(f"{count} {kind}" for kind, count in case["parts"].items())
+    return f"{sizes} parts at w_c = {case['weight']:g}"
 
 
 def drawn(case: Case, state: str, title: str) -> DrawnState:
@@ -117,7 +203,7 @@ def draw_map(cases: Sequence[Case]) -> Figure:
     kits = list(dict.fromkeys(tuple(case["parts"].items()) for case in cases))
     weights = sorted({case["weight"] for case in cases})
     values = [case["at the parts %"] for case in cases if "at the parts %" in case]
-    norm = LogNorm(min(values), max(max(values), 1.01 * min(values)))
+    norm = LogNorm(min(values, default=1.0), max([*values, 1.01 * min(values, default=1.0)]))
     with style():
         figure = Figure(
             figsize=(1.6 + 1.35 * len(weights), 1.5 + 0.62 * len(kits)), layout="constrained"

@@ -10,11 +10,8 @@ import numpy as np
 
 from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.search.dataset import Dataset
-from kop_exudyn.search.objective import Evaluation, Weights
-from kop_exudyn.search.pool import DesignPool
-from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.objective import Evaluation
 from kop_exudyn.search.stage_results import Jump, StageResult, find_jump
-from kop_exudyn.search.stages import Stages
 from kop_exudyn.structures.base import Design
 
 
@@ -52,23 +49,6 @@ def watch(
             dataset.designs, dataset.references, relaxed.evaluations, paths
         )
     ]
-
-
-def watch_one(
-    design: Design,
-    parts: dict[str, int],
-    settings: StageSettings,
-) -> tuple[WatchedPath | SimulationFailure, StageResult]:
-    """One design relaxed with its own kit and followed to its parts, and the relaxed result.
-
-    Raises SimulationFailure when the input design can't be simulated.
-    """
-    with DesignPool([design]) as pool:
-        pool.prepare()
-        dataset = Dataset.of_pool(pool, Weights.suiting([design]))
-        stages = Stages(dataset, parts, settings)
-        relaxed = stages.relaxed(stages.direct().kit)
-        return watch(dataset, relaxed, settings.path_steps)[0], relaxed
 
 
 def _watched(

@@ -178,6 +178,7 @@ def test_the_result_names_the_confirmed_states(finished):
         for stage in result.stages:
             assert written[stage]["confirmed"] == sorted(role.name for role in design.roles)
             assert written[stage]["exudyn"]["moved"] < 1e-6
+    assert 0 < data["seconds"]["confirmation"] < data["wall_s"]  # one process
 
 
 def test_a_stage_that_exudyn_refuses_is_a_failure_of_the_result(monkeypatch):
