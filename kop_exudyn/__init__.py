@@ -24,6 +24,9 @@ if TYPE_CHECKING:  # the same names, for type checkers and editors
     from .errors import SimulationFailure as SimulationFailure
     from .exchange.export import export_desk as export_desk
     from .exchange.export import export_simulation as export_simulation
+    from .exchange.objects import to_compas as to_compas
+    from .exchange.objects import to_meshio as to_meshio
+    from .exchange.objects import to_pandas as to_pandas
     from .fabrication.folder import export_workshop as export_workshop
     from .fabrication.options import CutOptions as CutOptions
     from .fabrication.pieces import parts_list_of as parts_list_of
@@ -39,6 +42,7 @@ if TYPE_CHECKING:  # the same names, for type checkers and editors
     from .kit.parts import Kit as Kit
     from .report.kit_report import write_kit_report as write_kit_report
     from .report.kit_run import optimize_and_report as optimize_and_report
+    from .report.plot import plot as plot
     from .search.input_fit import fit_input as fit_input
     from .search.objective import Weights as Weights
     from .search.result import KitResult as KitResult
@@ -71,6 +75,8 @@ _PUBLIC = {
     "io.datasets": ("load_designs",),
     "io.designs": ("load_design",),
     "exchange.export": ("export_desk", "export_simulation"),
+    "exchange.objects": ("to_compas", "to_meshio", "to_pandas"),
+    "report.plot": ("plot",),
     "fabrication.folder": ("export_workshop",),
     "io.kits": ("load_kit", "save_kit"),
     "fabrication.pieces": ("parts_list_of",),

@@ -23,7 +23,7 @@ from ..structures.fitting import FitResult, TargetFitting
 from ..structures.loading import LoadedState, loaded_state
 from ..structures.loads import LoadCase
 from ..structures.plausibility import design_doubts
-from ..structures.strength import strength_summary
+from ..structures.strength import Strength, design_strength, strength_summary
 from .load_check import LoadCheck, check_load
 
 log = logging.getLogger(__name__)
@@ -64,6 +64,31 @@ class SimulationResult:
     def deployed(self) -> Equilibrium:
         """The equilibrium that the design is made for."""
         return self.equilibria[self.design.fitted_role.name]
+
+    @property
+    def strength(self) -> Strength:
+        """Stresses of the deployed state's rod elements, beside their limits; see `Strength`."""
+        role = self.design.fitted_role.name
+        return design_strength(self.design, {role: self.deployed})[role]
+
+    @property
+    def stress(self) -> np.ndarray:
+        """(E,) equivalent stress (von Mises) of the deployed state's rod elements, in the design's
+        unit of force / length^2; NaN where an element has no section."""
+        return self.strength.equivalent
+
+    @property
+    def utilisation(self) -> np.ndarray:
+        """(E,) that stress over the elastic limit; above 1 a rod yields or breaks. NaN where no
+        limit is known."""
+        return self.strength.utilisation
+
+    def __repr__(self) -> str:
+        kind = "stable" if self.deployed.stable else "unstable"
+        return (
+            f"<SimulationResult {self.design.name!r}: {kind}, "
+            f"at most {self.fit.max_percent:.3g} % off target>"
+        )
 
     @property
     def displaced_percent(self) -> float:

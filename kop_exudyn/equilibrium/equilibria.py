@@ -55,6 +55,11 @@ class Equilibrium:
     wall_s: float
     stable: bool = True
 
+    def __repr__(self) -> str:
+        opening = "" if self.opening is None else f", opening {self.opening:.4g} rad"
+        kind = "stable" if self.stable else "unstable"
+        return f"<Equilibrium: {kind}, elastic energy {self.elastic_energy:.6g}{opening}>"
+
     @property
     def start(self) -> Start:
         """This equilibrium as the start of another solve."""

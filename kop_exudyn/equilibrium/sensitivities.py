@@ -51,6 +51,9 @@ class Sensitivities:
         self._length_entries = self._differentiate_by_length()
         self._residual_q = self._assemble_residual_q()
 
+    def __repr__(self) -> str:
+        return f"<Sensitivities in {len(self.equilibrium.q)} parameters>"
+
     @property
     def system(self) -> System:
         """The system, with this equilibrium's Hessian and factorisation in it."""

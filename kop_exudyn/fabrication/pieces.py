@@ -70,6 +70,10 @@ class PartsList:
     designs: tuple[DesignPieces, ...]
     states: tuple[Mapping[str, State], ...] = ()
 
+    def __repr__(self) -> str:
+        names = ", ".join(placed.design.name for placed in self.designs)
+        return f"<PartsList of {self.kit!r} for {names}>"
+
     @cached_property
     def labels(self) -> dict[str, tuple[str, ...]]:
         """kind -> labels of its parts."""

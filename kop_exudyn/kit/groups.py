@@ -18,6 +18,10 @@ class ElementGroup:
     kind: str
     indices: np.ndarray
 
+    def __repr__(self) -> str:
+        n, k = self.indices.shape
+        return f"<ElementGroup: {n} {self.kind} elements of {k} parameters>"
+
     def shifted(self, offset: int) -> ElementGroup:
         """The same elements in a longer parameter vector (several designs after each other)."""
         return ElementGroup(self.kind, self.indices + offset)

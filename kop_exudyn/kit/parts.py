@@ -35,6 +35,11 @@ class Kit:
         checked = {name: _checked(part_kind(name), self.parts[name]) for name in sorted(self.parts)}
         object.__setattr__(self, "parts", checked)
 
+    def __repr__(self) -> str:
+        sizes = ", ".join(f"{count} {kind}" for kind, count in self.sizes.items())
+        unit = "" if self.units is None else f", in {self.units.length}"
+        return f"<Kit: {sizes} parts{unit}>"
+
     def __getitem__(self, kind: str) -> np.ndarray:
         """(m, k_p) parts of a kind; InputError when the kit has none."""
         if kind not in self.parts:
@@ -146,6 +151,10 @@ class Assignment:
     part: tuple[np.ndarray, ...]
     variant: tuple[np.ndarray, ...]
     n_q: int = field(default=0)
+
+    def __repr__(self) -> str:
+        sizes = ", ".join(f"{len(part)} {g.kind}" for g, part in zip(self.groups, self.part))
+        return f"<Assignment of {sizes} elements>"
 
     def matrix(self, kit: Kit, upper: bool = False) -> sp.csr_array:
         """M (n_q, n_p): the elements that the kit p realises are q = M p.

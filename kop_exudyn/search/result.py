@@ -73,6 +73,10 @@ class KitResult:
     given: Sequence[Mapping[str, Any]] = ()
     warnings: Sequence[str] = ()
 
+    def __repr__(self) -> str:
+        sizes = ", ".join(f"{count} {kind}" for kind, count in self.kit.sizes.items())
+        return f"<KitResult: {sizes} parts for {', '.join(d.name for d in self.designs)}>"
+
     @property
     def units(self) -> Units | None:
         """Of the designs and so of the kit; None where no design names any."""

@@ -114,6 +114,10 @@ class Design(ABC):
     roles: tuple[Role, ...]
     joints: np.ndarray
 
+    def __repr__(self) -> str:
+        unit = "" if self.units is None else f", in {self.units.length}"
+        return f"<{self.class_name} design {self.name!r}: {self.n_elements} elements{unit}>"
+
     @abstractmethod
     def scene(self, role: str) -> Scene:
         """The scene of one of the roles; the same object at every call."""

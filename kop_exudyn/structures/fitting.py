@@ -67,6 +67,12 @@ class FitResult:
     blocks: np.ndarray
     motions: np.ndarray
 
+    def __repr__(self) -> str:
+        return (
+            f"<FitResult of {len(self.distances)} joints: at most {self.max_percent:.3g} % off, "
+            f"{self.mean_percent:.3g} % in the mean>"
+        )
+
     @property
     def max_percent(self) -> float:
         """Largest distance from the surface, % of the target's size."""

@@ -52,6 +52,10 @@ class Strength:
     equivalent: np.ndarray
     limit: np.ndarray
 
+    def __repr__(self) -> str:
+        used = "" if self.largest is None else f", at most {100 * self.largest:.0f} % of the limit"
+        return f"<Strength of {len(self.equivalent)} rod elements{used}>"
+
     @property
     def utilisation(self) -> np.ndarray:
         """(E,) equivalent stress over elastic limit; above 1 the rod yields or breaks."""
