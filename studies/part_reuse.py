@@ -10,21 +10,30 @@ The reuse of a set of designs is the number of pieces that all of them use over 
 of them uses; for two designs that is the Jaccard index of their multisets of pieces. The average is
 over all sets of two or more designs. Kits that the other study left in its folder are taken from
 there, missing ones are computed.
+
+Then a kit is sought with more and more weight on the pieces that have to be made so that the
+designs can be built one after the other (`StageSettings.reuse`).
 """
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from kop_exudyn.analysis.reuse import counts_of, jaccard_matrix, part_users, reuse_figures
-from lib.reuse_drawing import draw_reuse_over_size, draw_sharing, draw_subsets
+from kop_exudyn.io.datasets import select_files
+from lib.repeated import repeated_task
+from lib.reuse_drawing import draw_front, draw_reuse_over_size, draw_sharing, draw_subsets
 from lib.study import Study
 from lib.study_tasks import shared_kits
+from lib.sweep import Task
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
 SHOWN = 12  # linear parts of the kit that is shown in detail
+WEIGHTS, QUICK_WEIGHTS = (0.0, 0.5, 1.0, 2.0, 4.0), (0.0, 4.0)
+ALLOWED = 1.05  # of the deviation without a weight
 
 
 def main() -> None:
@@ -78,6 +87,17 @@ def main() -> None:
         f"{rows[-1]['average reuse']:.2f}."
     )
 
+    front = weighed(study)
+    first = front[0]["max %"]
+    near = [row for row in front if first and row["max %"] and row["max %"] <= ALLOWED * first]
+    if near:
+        fewest = min(near, key=lambda row: row["pieces"])
+        saved = 1 - fewest["pieces"] / front[0]["pieces"]
+        finding += (
+            f" A weight of {fewest['weight']:g} on pieces saves {saved:.0%} of them, at a largest "
+            f"deviation of {fewest['max %']:.2f} % instead of {first:.2f} %."
+        )
+
     # 3. The report.
     report = study.report(finding)
     report.figure(
@@ -115,14 +135,52 @@ def main() -> None:
         "Pieces: as many of each part as the design that needs most; parts of one design: that "
         "no other one uses; sets that share nothing: 1 means that all designs are connected.",
     )
+    report.section(
+        "Fewer pieces as an aim",
+        "A kit of as many parts, searched with a weight on the pieces that have to be made.",
+    )
+    report.figure(
+        "front",
+        draw_front(front),
+        "A point a weight, which stands beside it.",
+        alt="Largest deviation and objective against pieces to make, for several weights",
+    )
+    report.table(
+        "weights",
+        front,
+        "Weight: by how many % the objective may rise for 1 % less pieces. Max: the larger of the "
+        "deviations as kept and as opened, % of the bounding box.",
+    )
     report.save(
         {
             "finding": finding,
+            "weights": front,
             "kits": rows,
             "details": {str(s): f for s, f in found.items()},
             "designs": names,
         }
     )
+
+
+def weighed(study: Study) -> list[dict[str, Any]]:
+    """Figures of one search a weight, the smallest weight first."""
+    if study.quick:
+        files, parts = select_files(MODELS / "small", 2), {"linear": 5, "angular": 2}
+    else:
+        files, parts = select_files(MODELS / "conformals", 5), {"linear": SHOWN, "angular": 5}
+    jobs = 1 if study.scheduler else study.jobs  # workers of a cluster start no processes
+    stages = {"effort": "quick"} if study.quick else {}
+    tasks = {
+        weight: Task(
+            f"reuse weight {weight:g}",
+            repeated_task,
+            {"files": files, "parts": parts, "stages": {**stages, "reuse": weight}, "seed": 0},
+            {"jobs": jobs},
+        )
+        for weight in (QUICK_WEIGHTS if study.quick else WEIGHTS)
+    }
+    values = study.sweep(list(tasks.values()), jobs=1)
+    return [{"weight": weight, **values[task.name]} for weight, task in tasks.items()]
 
 
 if __name__ == "__main__":

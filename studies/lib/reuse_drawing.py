@@ -139,6 +139,28 @@ def draw_reuse_over_size(rows: Sequence[Mapping[str, Any]], kind: str) -> Figure
     return figure
 
 
+def draw_front(rows: Sequence[Mapping[str, Any]]) -> Figure:
+    """Largest deviation, and the objective, against the pieces to make, a point a weight."""
+    with style():
+        figure, axes = plt.subplots(1, 2, figsize=(7.4, 3.1), layout="constrained")
+        labels = {"max %": "largest deviation, % of bounding box", "J": "objective"}
+        for ax, (column, label) in zip(axes, labels.items()):
+            for row in rows:
+                if row[column] is None:
+                    continue
+                ax.plot(row["pieces"], row[column], "o", color=PALETTE["blue"], markersize=4.5)
+                ax.annotate(
+                    f"{row['weight']:g}",
+                    (row["pieces"], row[column]),
+                    xytext=(5, 4),
+                    textcoords="offset points",
+                    fontsize=8,
+                )
+            ax.set(xlabel="pieces to make", ylabel=label)
+            ax.margins(0.15)
+    return figure
+
+
 def _table(
     ax: Axes,
     values: np.ndarray,

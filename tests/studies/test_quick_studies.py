@@ -14,7 +14,7 @@ import pytest
 STUDIES = Path(__file__).resolve().parents[2] / "studies"
 FIGURES = {
     "kit_size_tradeoff": ["tradeoff"],
-    "part_reuse": ["sharing", "subsets", "sizes"],
+    "part_reuse": ["sharing", "subsets", "sizes", "front"],
     "project_new_design": ["sweep", "changes"],
     "slit_parts": ["slits", "intervals"],
 }
@@ -62,7 +62,8 @@ def test_smaller_kits_fit_worse(reports):
 
 
 def test_other_studies_take_the_kits_from_there(reports):
-    assert not (reports / "part_reuse" / "sweep").exists()
+    own = {path.name for path in (reports / "part_reuse" / "sweep").glob("*-*.json")}
+    assert len(own) == 2 and all(name.startswith("reuse") for name in own)
     kept = {path.name for path in (reports / "project_new_design" / "sweep").glob("*-*.json")}
     assert len(kept) == 2 and all(name.startswith("w_c") for name in kept)
 
@@ -77,6 +78,11 @@ def test_reuse_agrees_with_the_sizes(reports):
         assert pair["reuse"] == details["average_reuse"] == details["jaccard"][0][1]
         # of two multisets of equal size: |A u B| = 2 n - |A n B|
         assert details["kit_size_percent"] == pytest.approx(100 / (1 + pair["reuse"]))
+
+
+def test_a_weight_on_pieces_saves_some(reports):
+    without, few = data_of(reports, "part_reuse")["weights"]
+    assert few["pieces"] < without["pieces"] and few["J"] > without["J"]
 
 
 def test_a_new_design_is_built_better_after_relaxation(reports):
