@@ -9,11 +9,12 @@ of the curve; at an end without free end the one there is.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..errors import InputError
 from ..geometry.network import Strand
 from ..kit.groups import ElementGroup
 
@@ -55,6 +56,37 @@ class Numbering:
     is_length: np.ndarray
     groups: list[ElementGroup]
     strands: tuple[StrandNumbers, ...]
+
+    def replaced(self, values: Mapping[str, Sequence[float]], field: str) -> Numbering:
+        """The same pieces with other lengths and corner angles.
+
+        values : "lengths", in the unit of the design, and "angles", rad: in the order of q
+        field : that errors name
+
+        Raises InputError for other numbers of values, and for lengths that aren't positive.
+        """
+        parameters = self.parameters.copy()
+        for name, which in (("lengths", self.is_length), ("angles", ~self.is_length)):
+            given = np.array(values[name], float)
+            if given.shape != (int(which.sum()),):
+                raise InputError(
+                    f"the straightened curves have {which.sum()} {name}",
+                    field=f"{field}.{name}",
+                    value=f"{given.size} numbers",
+                )
+            parameters[which] = given
+        shortest = float(parameters[self.is_length].min(initial=np.inf))
+        if shortest <= 0:
+            raise InputError("must be positive", field=f"{field}.lengths", value=shortest)
+        return replace(self, parameters=parameters)
+
+    def split(self, parameters: np.ndarray, digits: int = 9) -> dict[str, list[float]]:
+        """Values for `replaced`, rounded: of parameters (nq,)."""
+        rounded = np.round(parameters, digits)
+        return {
+            "lengths": rounded[self.is_length].tolist(),
+            "angles": rounded[~self.is_length].tolist(),
+        }
 
     def bounds(self, largest_corner: float) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds (nq,), for corners up to an angle (rad); no shorter length than

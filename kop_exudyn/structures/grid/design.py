@@ -46,8 +46,11 @@ class Grid(Design):
     held : joints that keep their places on the surface, by supports or an edge beam: their numbers,
         "corners" (where two lamellas end) or "boundary" (where one ends); default: none, the grid
         finds its own shape
+    straightened : "lengths" and "angles" in place of those that follow from the curves, see
+        `Numbering.replaced`: of a grid that was fitted to its surface
 
-    Raises InputError for held joints that don't exist, or that lie on one line.
+    Raises InputError for held joints that don't exist, or that lie on one line, and for values that
+    are none of the straightened lamellas.
     """
 
     class_name = "grid"
@@ -64,11 +67,14 @@ class Grid(Design):
         *,
         elements_per_piece: int = 2,
         held: str | Sequence[int] | None = None,
+        straightened: Mapping[str, Any] | None = None,
     ):
         self.name, self.surface, self.network = name, surface, network
         self.section, self.material, self.elements_per_piece = section, material, elements_per_piece
         self.straight = straighten_on(surface, network)
         numbering = self.straight.numbering
+        if straightened is not None:
+            numbering = numbering.replaced(straightened, "straightened")
         self.parameters, self.groups = numbering.parameters, numbering.groups
         self.lower, self.upper = numbering.bounds(_LARGEST_CORNER)
         self.held = (
@@ -233,6 +239,7 @@ def grid_on(surface: Surface, data: Mapping[str, Any]) -> Grid:
         material_from_dict(data["material"]),
         elements_per_piece=data.get("elements_per_piece", 2),
         held=data.get("held"),
+        straightened=data.get("straightened"),
     )
 
 
@@ -291,4 +298,8 @@ def _surface(data: Mapping[str, Any], source: str, origin: np.ndarray) -> Surfac
 def rescaled_grid(data: Mapping[str, Any], factor: float) -> dict[str, Any]:
     """The grid at another size: its surface, with the curves at the same parameters."""
     size = factor * data["surface"].get("size", 1.0)
-    return {**data, "surface": {**data["surface"], "size": size}}
+    resized = {**data, "surface": {**data["surface"], "size": size}}
+    if (given := data.get("straightened")) is not None:
+        lengths = (factor * np.array(given["lengths"], float)).tolist()
+        resized["straightened"] = {**given, "lengths": lengths}
+    return resized
