@@ -246,19 +246,25 @@ def test_constraints_on_elements_hold_in_both_stages(stages):
 
     constraints = on_elements(designs, statement)
     assert constraints.rows == 2
-    settings = StageSettings(schedule=(1e3, 1e5), constraints=constraints)
-    outcome = optimize_kit(
-        designs, PARTS, settings=JobSettings(jobs=1, baselines=False, stages=settings)
+    settings = StageSettings(
+        schedule=(1e3,),
+        relaxed_steps=5,
+        assigned_steps=5,
+        round_steps=3,
+        reassignments=1,
+        leaps=0,
+        redeployments=0,
+        effort="quick",
+        constraints=constraints,
+    )
+    outcome, free = (
+        optimize_kit(designs, PARTS, settings=JobSettings(jobs=1, baselines=False, stages=own))
+        for own in (settings, replace(settings, constraints=None))
     )
     scale = float(np.abs(constraints.upper).max())
     for stage in ("relaxed", "assigned"):
         q = np.concatenate([e.q for e in outcome.stages[stage].designs])
         assert constraints.violation(q) < 1e-7 * scale, stage
-    free = optimize_kit(
-        designs,
-        PARTS,
-        settings=JobSettings(jobs=1, baselines=False, stages=StageSettings(schedule=(1e3, 1e5))),
-    )
     q = np.concatenate([e.q for e in free.stages["assigned"].designs])
     assert constraints.violation(q) > 1e-3 * scale
 

@@ -1,5 +1,6 @@
 """The objective's terms: exact gradients, honest models, and one that is added from outside."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -72,12 +73,15 @@ def test_weights_by_name():
         Weights.of({"stress": float("nan")})
 
 
+def coarse(repository, name):
+    """A grid of models/grids with one element a piece."""
+    data = json.loads((repository / "models" / "grids" / f"{name}.json").read_text())
+    return design_from_dict(data | {"elements_per_piece": 1})
+
+
 def test_more_weight_on_stress_lowers_it(repository):
     """And the kit is found with that term as with the others."""
-    designs = [
-        load_design(repository / "models" / "grids" / f"{name}.json")
-        for name in ("01_dome", "02_saddle")
-    ]
+    designs = [coarse(repository, name) for name in ("01_dome", "03_enneper")]
     stresses = []
     for weight in (0.0, 0.3):
         settings = JobSettings(
@@ -85,7 +89,12 @@ def test_more_weight_on_stress_lowers_it(repository):
             jobs=1,
             baselines=False,
             stages=StageSettings(
-                schedule=(1e4,), reassignments=0, relaxed_steps=6, assigned_steps=10
+                schedule=(1e4,),
+                reassignments=0,
+                relaxed_steps=6,
+                assigned_steps=10,
+                redeployments=0,
+                effort="quick",
             ),
         )
         outcome = optimize_kit(designs, {"linear": 4, "angular": 3}, settings=settings)
@@ -143,13 +152,20 @@ def test_a_term_is_one_class(repository, monkeypatch, jobs):
         def _used(self, q):
             return sum(q[g.indices].sum() for g in self.design.groups if g.kind == "linear")
 
-    designs = [load_design(repository / "models" / "grids" / "01_dome.json") for _ in range(jobs)]
+    designs = [coarse(repository, "01_dome") for _ in range(jobs)]
     designs[-1].name = "the last one"
     settings = JobSettings(
         Weights.of({"material": 20.0}),
         jobs=jobs,
         baselines=False,
-        stages=StageSettings(schedule=(1e3,), reassignments=0, relaxed_steps=3, assigned_steps=3),
+        stages=StageSettings(
+            schedule=(1e3,),
+            reassignments=0,
+            relaxed_steps=3,
+            assigned_steps=3,
+            redeployments=0,
+            effort="quick",
+        ),
     )
     outcome = optimize_kit(designs, {"linear": 2, "angular": 2}, settings=settings)
     evaluation = outcome.stages["assigned"].designs[0]
