@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from .surfaces import Surface
+from .surfaces import LocalGeometry, Surface
 
 _RELATIVE, _ABSOLUTE = 1e-9, 1e-11
 _LONGEST = 4.0  # times the domain's size: a curve that still winds on then is cut off
@@ -77,8 +77,8 @@ def asymptotic_line(domain: Domain, point: Any, family: int, samples: int = 60) 
     curvature Raises InputError where the surface has no asymptotic directions.
     """
 
-    def direction(uv: np.ndarray) -> np.ndarray | None:
-        values, vectors = domain.surface.local(uv[None]).principal()
+    def direction(local: LocalGeometry) -> np.ndarray | None:
+        values, vectors = local.principal()
         low, high = values[0]
         if not low < -_DIRECTIONLESS * high or not high > -_DIRECTIONLESS * low:
             return None
@@ -102,8 +102,8 @@ def curvature_line(domain: Domain, point: Any, family: int, samples: int = 60) -
     Raises InputError at umbilic points, where no direction is principal.
     """
 
-    def direction(uv: np.ndarray) -> np.ndarray | None:
-        values, vectors = domain.surface.local(uv[None]).principal()
+    def direction(local: LocalGeometry) -> np.ndarray | None:
+        values, vectors = local.principal()
         return (
             None
             if np.ptp(values[0]) <= _DIRECTIONLESS * np.abs(values[0]).max()
@@ -117,7 +117,7 @@ def curvature_line(domain: Domain, point: Any, family: int, samples: int = 60) -
 
 def _field_line(
     domain: Domain,
-    direction: Callable[[np.ndarray], np.ndarray | None],
+    direction: Callable[[LocalGeometry], np.ndarray | None],
     point: Any,
     samples: int,
     reason: str,
@@ -125,7 +125,7 @@ def _field_line(
     """Follow a field of unit directions without sense; it is made continuous by the last direction
     taken."""
     point = _inside(domain, point)
-    start = direction(point)
+    start = direction(domain.surface.local(point[None]))
     if start is None:
         raise InputError(reason, field="network.points", value=point.tolist())
 
@@ -133,11 +133,11 @@ def _field_line(
         last = [first]
 
         def slope(_: float, y: np.ndarray) -> np.ndarray:
-            here = direction(y)
+            local = domain.surface.local(y[None])
+            here = direction(local)
             if here is None:
                 raise _Lost
-            metric = domain.surface.local(y[None]).metric[0]
-            here = here if here @ metric @ last[0] > 0 else -here
+            here = here if here @ local.metric[0] @ last[0] > 0 else -here
             last[0] = here
             return here
 

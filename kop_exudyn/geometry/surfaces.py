@@ -13,6 +13,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -264,7 +265,12 @@ def _pseudosphere(u: Jet, v: Jet, *, scale: float) -> tuple[Jet, Jet, Jet]:
 
 def _polynomial(u: Jet, v: Jet, *, coefficients: list[list[float]]) -> tuple[Jet, Jet, Jet]:
     """z = sum c[i][j] u^i v^j."""
-    terms = [c * u**i * v**j for i, row in enumerate(coefficients) for j, c in enumerate(row) if c]
+    terms = []
+    for i, row in enumerate(coefficients):
+        for j, c in enumerate(row):
+            if c:
+                powers = [x if k == 1 else x**k for x, k in ((u, i), (v, j)) if k]
+                terms.append(prod(powers[1:], start=powers[0] * c) if powers else constant(c, u))
     return u, v, sum(terms, constant(0.0, u))
 
 
