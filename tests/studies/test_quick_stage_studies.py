@@ -112,3 +112,10 @@ def test_repeatability(run):
     assert len(data["runs"]) == case["runs"] == 2 and case["smallest J"] > 0
     values = [one["J"] for one in data["runs"]]
     assert case["spread of J %"] == 100 * (max(values) / min(values) - 1) > 0
+
+
+def test_soak(run):
+    data = run("soak")
+    assert len(data["cases"]) == 20 and data["wrong"] == []
+    assert {row["class"] for row in data["outcomes"]} == {"C-shells", "grids", "umbrella meshes"}
+    assert sum(case["outcome"] == "stable" for case in data["cases"]) >= 15
