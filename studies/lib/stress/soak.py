@@ -29,7 +29,9 @@ from .random_designs import CLASSES, HERE, Place, random_design, random_place, w
 # where coordinates are rounded to 2e-16 of that distance before we see them.
 SAME, ROUNDED = 1e-9, 4e-15
 NUDGE, BACK = 1e-5, 1e-6  # of the size, and rad: from where a state is found again, how closely
-_ENERGY = 1e-6  # relative
+# What percentages and energies, relatively, may differ by, over what the states may: bending comes
+# from second differences of coordinates.
+_LEVER = 1e3
 
 
 class Found:
@@ -138,10 +140,10 @@ def _differences(
         found.append(f"states {apart:.1e} of the size apart, allowed {allowed:.1e}")
     for name in ("max_percent", "mean_percent"):
         a, b = (getattr(result.fit, name) for result in (first, second))
-        if abs(a - b) > 1e3 * allowed:
+        if abs(a - b) > _LEVER * allowed:
             found.append(f"{name} {a:.9g} and {b:.9g}")
     a, b = first.equilibrium.elastic_energy, second.equilibrium.elastic_energy / place.unit
-    if abs(a - b) > _ENERGY * abs(a) + 10 * allowed * abs(a):
+    if abs(a - b) > _LEVER * allowed * abs(a):
         found.append(f"energies {a:.9g} and {b:.9g}")
     a, b = size, second.design.target.size / place.unit
     if abs(a - b) > allowed * a:
