@@ -11,7 +11,7 @@ from kop_exudyn.errors import InputError
 from kop_exudyn.io.checkpoint import Job
 from kop_exudyn.io.datasets import load_designs, select_files
 from kop_exudyn.io.saved_runs import load_run
-from kop_exudyn.report.kit_run import optimize_and_report
+from kop_exudyn.report.kit_run import optimize_and_report, within_workshop
 from kop_exudyn.search.result import KitResult
 from kop_exudyn.search.run import described_job
 from kop_exudyn.search.settings import JobSettings, StageSettings
@@ -36,6 +36,7 @@ class KitCase:
     name : of the class, as a reader knows it
     folder : of design files; number : of them, in order of their names (None: all)
     parts : kind -> number of parts
+    baselines : whether the unrelaxed baseline is computed as well
     """
 
     name: str
@@ -43,6 +44,7 @@ class KitCase:
     number: int | None
     parts: Mapping[str, int]
     stages: StageSettings = StageSettings()
+    baselines: bool = True
 
     @property
     def files(self) -> list[Path]:
@@ -83,7 +85,9 @@ def kit_of(case: KitCase, folder: Path, jobs: int) -> KitResult:
     Raises InputError and SimulationFailure as `optimize_and_report` does.
     """
     designs, files = load_designs(case.folder, case.number), case.files
-    settings = JobSettings(stages=case.stages, jobs=jobs)
+    settings = within_workshop(
+        designs, JobSettings(stages=case.stages, jobs=jobs, baselines=case.baselines)
+    )
     record = folder / "checkpoints" / "job.json"
     job = Job.of(described_job(designs, case.parts, None, settings), files)
     same = record.exists() and Job.load(record).difference(job) is None
