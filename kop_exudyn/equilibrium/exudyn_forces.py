@@ -128,10 +128,12 @@ class SceneForces:
     def user_functions(self) -> tuple[Any, Any]:
         """Force and Jacobian as Exudyn's `ObjectGenericODE2` takes them."""
 
-        def force(mbs, t, number, q, q_t):
+        def force(mbs: Any, t: float, number: int, q: Any, q_t: Any) -> Any:
             return self.force(np.array(q), t)
 
-        def jacobian(mbs, t, number, q, q_t, factor, factor_t):
+        def jacobian(
+            mbs: Any, t: float, number: int, q: Any, q_t: Any, factor: float, factor_t: float
+        ) -> Any:
             matrix = self.stiffness(np.array(q), t)
             matrix.eliminate_zeros()  # Exudyn's triplets must not be zero
             container = exu.MatrixContainer()

@@ -388,7 +388,7 @@ class _AddedStiffness:
     def user_function(self) -> Any:
         """The function as Exudyn calls it."""
 
-        def added(mbs, t, factor, factor_t, factor_1):
+        def added(mbs: Any, t: float, factor: float, factor_t: float, factor_1: float) -> Any:
             return self._matrix
 
         return added

@@ -8,10 +8,11 @@ standard one at which no label covers another.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -248,7 +249,9 @@ class AssemblyDrawing:
                     parse_math=False,
                 )
 
-    def _draw_cells(self, ax: Axes, scale: float, origin: np.ndarray, clip, shades) -> None:
+    def _draw_cells(
+        self, ax: Axes, scale: float, origin: np.ndarray, clip: Any, shades: Mapping[str, Any]
+    ) -> None:
         """Plates in their parts' colours, made lighter so that labels can be read on them."""
         colours = [
             0.45 * shades[piece.kind][piece.part] + 0.55 for piece in self.placed.pieces.pieces
@@ -269,7 +272,7 @@ class AssemblyDrawing:
                 yield np.array([line[end], line[end] + _GAP * step])
 
 
-def _add(ax: Axes, lines: Sequence[np.ndarray], colours, width: float, clip) -> None:
+def _add(ax: Axes, lines: Sequence[np.ndarray], colours: Any, width: float, clip: Any) -> None:
     collection = LineCollection(lines, colors=colours, linewidths=width, capstyle="butt")
     ax.add_collection(collection, autolim=False)
     if clip is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -238,7 +239,13 @@ def minimise_model(
     return None if best is None else replace(best, wall_s=time.perf_counter() - began)
 
 
-def _next_damping(previous, known, radius: float, least: float, most: float) -> float:
+def _next_damping(
+    previous: tuple[float, float] | None,
+    known: tuple[float, float],
+    radius: float,
+    least: float,
+    most: float,
+) -> float:
     """The secant for 1/|u| = 1/(0.9 radius), kept inside the bracket."""
     guess = np.nan
     if previous is not None and known[1] != previous[1]:
@@ -290,7 +297,9 @@ def _elastic(model: QuadraticModel, qp: QP) -> tuple[QP, np.ndarray]:
     ), bounds
 
 
-def _damped(model: QuadraticModel, damping: float, solver: QPSolver, start) -> ModelStep | None:
+def _damped(
+    model: QuadraticModel, damping: float, solver: QPSolver, start: Any
+) -> ModelStep | None:
     n, qp = model.region.n, model.qp
     if damping > 0:
         weights = np.zeros(qp.g.size)
@@ -319,7 +328,7 @@ def _damped(model: QuadraticModel, damping: float, solver: QPSolver, start) -> M
 
 
 def _solved_elastic(
-    model: QuadraticModel, qp: QP, solver: QPSolver, start, wall_s: float
+    model: QuadraticModel, qp: QP, solver: QPSolver, start: Any, wall_s: float
 ) -> tuple[QPResult | None, np.ndarray]:
     """The elastic subproblem's solution without its slacks, and the bounds' multipliers (k,)."""
     rows = model.bounds

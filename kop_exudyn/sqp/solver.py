@@ -7,6 +7,7 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -151,7 +152,7 @@ def minimise(
 class _Run:
     """One call of ``minimise``."""
 
-    def __init__(self, problem: Problem, options: SQPOptions, observer, checkpoint):
+    def __init__(self, problem: Problem, options: SQPOptions, observer: Any, checkpoint: Any):
         self.problem, self.options = problem, options
         self.observer, self.checkpoint = observer, checkpoint
         lower, upper = validate_bounds(problem.lower, problem.upper, problem.n)
@@ -190,7 +191,7 @@ class _Run:
             if self.checkpoint is not None:
                 self.checkpoint(state, point)
 
-    def _advanced(self, state: SQPState, point: Point, derivatives: Derivatives):
+    def _advanced(self, state: SQPState, point: Point, derivatives: Derivatives) -> Any:
         """The next state, point and derivatives; or the result, where there is none."""
         norm, state = self._stationarity(point, derivatives, state)
         met = not point.excess.any()
@@ -240,7 +241,9 @@ class _Run:
             r.actual for r in recent
         ) <= self.options.decrease_tolerance * abs(point.value)
 
-    def _begin(self, x0, state: SQPState | None, start: Point | None) -> tuple[SQPState, Point]:
+    def _begin(
+        self, x0: Any, state: SQPState | None, start: Point | None
+    ) -> tuple[SQPState, Point]:
         """The first state and point; the quasi-Newton matrix of a resumed run."""
         if state is None:
             n, m = self.region.n, self.region.constraints.rows
@@ -307,7 +310,7 @@ class _Run:
             hessian = hessian + self.secant.matrix()
         return build_model(point.x, derivatives, hessian, self.region, penalty)
 
-    def _step(self, point: Point, model: QuadraticModel, state: SQPState, norm: float):
+    def _step(self, point: Point, model: QuadraticModel, state: SQPState, norm: float) -> Any:
         """The next accepted state and point, or the result when there is none."""
         radius, trials, failures, last = state.radius, 0, 0, ""
         while trials < self.options.max_trials and radius >= self.options.min_radius:
@@ -445,7 +448,7 @@ class _Run:
             state,
         )
 
-    def _timed(self, phase: str, function, *arguments):
+    def _timed(self, phase: str, function: Callable[..., Any], *arguments: Any) -> Any:
         began = time.perf_counter()
         try:
             return function(*arguments)

@@ -257,7 +257,14 @@ class _LayoutBuilder:
         else:
             self._piece((body, joint), (far, at), (tip, x), angle, parameter)
 
-    def _piece(self, ends, stations, points, angle: float, parameter: int) -> None:
+    def _piece(
+        self,
+        ends: tuple[int, int],
+        stations: tuple[float, float],
+        points: tuple[np.ndarray, np.ndarray],
+        angle: float,
+        parameter: int,
+    ) -> None:
         share = np.linspace(0, 1, self.elements + 1)
         s = stations[0] + share * (stations[1] - stations[0])
         x = points[0] + share[1:-1, None] * (points[1] - points[0])

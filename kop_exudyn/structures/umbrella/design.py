@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from ...scene.attraction import Attraction
     from ...scene.scene import Scene
     from ...scene.state import State
+    from .scene import UmbrellaScene
 
 # Shortest arms of the published designs, as a multiple of the plate edge.
 _LEAST_LENGTH = 32 / 30
@@ -127,7 +128,7 @@ class Umbrella(Design):
         return design
 
     @cached_property
-    def _model(self):
+    def _model(self) -> UmbrellaScene:
         from .scene import UmbrellaModel, umbrella_scene
 
         return umbrella_scene(
