@@ -6,16 +6,18 @@ from __future__ import annotations
 import argparse
 import logging
 import os
+import re
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 from keyword import iskeyword
+from pathlib import Path
 from typing import NoReturn
 
 from . import __version__
 from .commands import NAMES
 from .commands.colour import RED, LogFormatter, coloured
-from .errors import InputError, SimulationFailure
+from .errors import InputError, SimulationFailure, did_you_mean
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -42,19 +44,77 @@ class _Parser(argparse.ArgumentParser):
     """Errors in one line, like those about files."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(BAD_INPUT, f"{self.prog}: {message} (see {self.prog} --help)\n")
+        self.exit(BAD_INPUT, f"{self.prog}: {_suggesting(message)} (see {self.prog} --help)\n")
+
+    def refuse(self, unknown: Sequence[str]) -> NoReturn:
+        """End for arguments that aren't known, with the option that may have been meant."""
+        first = unknown[0].partition("=")[0]
+        hint = did_you_mean(first, self._option_string_actions) if first.startswith("-") else ""
+        self.error(f"unknown argument {' '.join(unknown)}{': ' if hint else ''}{hint.strip()}")
+
+    def options(self) -> set[str]:
+        """All options that it takes."""
+        return set(self._option_string_actions)
+
+    def inputs(self, args: argparse.Namespace) -> list[Path]:
+        """Files and folders that are given by their places, but for one to write to ("out")."""
+        values = [
+            getattr(args, action.dest)
+            for action in self._get_positional_actions()
+            if action.type is Path and action.dest != "out"
+        ]
+        return [
+            path
+            for value in values
+            for path in (value if isinstance(value, list) else [value])
+            if path is not None
+        ]
+
+
+def _suggesting(message: str) -> str:
+    """argparse's message about a choice, with the one that may have been meant first."""
+    found = re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)", message)
+    if not found:
+        return message
+    choices = found.group(2).replace("'", "").split(", ")
+    hint = did_you_mean(found.group(1), choices)
+    return message[: found.end(1) + 1] + f" ({hint}choose from {', '.join(choices)})"
+
+
+def _as_typed(error: InputError, options: set[str]) -> str:
+    """The error's text, a field without a file named as the option that it was given with."""
+    text = str(error)
+    if error.source is not None or error.field is None:
+        return text
+    head = re.split(r"[.\[]", error.field)[0]
+    option = f"--{head.replace('_', '-')}"
+    return f"--{option[2:]}{text[len(head) :]}" if option in options else text
+
+
+def _with_way_out(text: str, options: set[str]) -> str:
+    """What to do about files that are there already, where the command has an option for it."""
+    there = re.search(r"exists already$|an earlier run|a different job", text)
+    if not there or "--overwrite" not in options:
+        return text
+    return f"{text.replace(': choose another or allow overwriting', '')} (--overwrite replaces it)"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run ``kop`` with these arguments (default: those of the process); returns the exit status."""
-    args = make_parser().parse_args(argv)
+    args, unknown = make_parser().parse_known_args(argv)
+    if unknown:
+        args.command.refuse(unknown)
     _set_up_logging(args)
     try:
+        for path in args.command.inputs(args):
+            if not os.path.exists(path):
+                raise InputError(f"no such {'file' if path.suffix else 'folder'}", source=path)
         status = args.run(args)
         sys.stdout.flush()  # here, where a reader that has gone can be dealt with
         return status
     except InputError as error:
-        return _complain(str(error), BAD_INPUT)
+        options = args.command.options()
+        return _complain(_with_way_out(_as_typed(error, options), options), BAD_INPUT)
     except SimulationFailure as failure:
         return _complain(f"simulation failed: {failure}", FAILED)
     except KeyboardInterrupt:
@@ -95,7 +155,7 @@ def make_parser() -> argparse.ArgumentParser:
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         command.arguments(subparser)
-        subparser.set_defaults(run=command.run, parser=parser)
+        subparser.set_defaults(run=command.run, parser=parser, command=subparser)
     return parser
 
 

@@ -3,6 +3,8 @@ equilibrium."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from difflib import get_close_matches
 from typing import Any
 
 
@@ -74,3 +76,10 @@ def _rebuild_failure(reason: str, where: str | None) -> SimulationFailure:
 def _short(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """ "did you mean 'linear'? " where one of the known names is near, else nothing: goes before
+    the list of what is known."""
+    near = get_close_matches(name.lower(), [str(one) for one in known], 1)
+    return f"did you mean {near[0]!r}? " if near else ""

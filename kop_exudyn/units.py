@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from .errors import InputError
+from .errors import InputError, did_you_mean
 
 # metres and newtons of one unit
 LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}
@@ -48,7 +48,7 @@ class Units:
         ):
             if value not in known:
                 raise InputError(
-                    f"unknown unit (known: {', '.join(known)})",
+                    f"unknown unit ({did_you_mean(str(value), known)}known: {', '.join(known)})",
                     field=f"units.{field}",
                     value=value,
                 )

@@ -3,6 +3,7 @@
 import io
 import json
 import logging
+import re
 import subprocess
 import sys
 import time
@@ -524,7 +525,7 @@ def test_a_reader_that_stops_early_is_no_error(joints):
         f"answer = {{'joints': [[0.0] * 3] * {joints}}}",
         "result = SimpleNamespace(to_dict=lambda: answer)",
         "simulation.simulate = lambda design, loads, engine: result",
-        "sys.exit(cli.main(['simulate', 'x', '--json']))",
+        "sys.exit(cli.main(['simulate', sys.executable, '--json']))",
     ]
     process = subprocess.Popen(
         [sys.executable, "-c", "\n".join(lines)],
@@ -594,3 +595,28 @@ class TestSizes:
         arguments = (name, design_file.parent, "--out", tmp_path / "out", *options)
         assert status_of(*arguments) == 2
         assert message in capsys.readouterr().err and not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("optimze models", "did you mean 'optimize'"),
+        ("simulate DESIGN --jsn", "unknown argument --jsn: did you mean '--json'"),
+        ("simulate DESIGN --engine exudin", "did you mean 'exudyn'"),
+        ("optimize FOLDER --parts linera=3 --out OUT", "--parts = 'linera'.*did you mean 'linear'"),
+        ("view DESIGN --out DESIGN", "exists already .--overwrite replaces it"),
+        ("import no.dxf --out a.json", "no.dxf: no such file"),
+        ("export none FOLDER --out OUT", "none: no such folder"),
+    ],
+)
+def test_messages_say_what_was_meant(line, message, repository, tmp_path, capsys):
+    small = repository / "models" / "small"
+    places = {"DESIGN": small / "01_sinh.json", "FOLDER": small, "OUT": tmp_path / "out"}
+    words = [str(places.get(word, word)) for word in line.split()]
+    try:
+        status = cli.main(words)
+    except SystemExit as end:
+        status = end.code
+    assert status == 2
+    assert re.search(message, capsys.readouterr().err)
+    assert not (tmp_path / "out").exists()

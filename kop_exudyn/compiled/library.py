@@ -26,7 +26,9 @@ def library() -> ctypes.CDLL | None:
     for folder in folders:
         if (folder / file_name()).is_file():
             return _load(folder / file_name())
-    log.warning("compiling the kernels, once: this takes some seconds")
+    log.warning(
+        "first run: compiling the kernels, once on this machine; this takes 5 to 30 seconds"
+    )
     reason = ""
     for folder in folders:
         try:

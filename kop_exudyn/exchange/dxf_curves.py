@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -166,11 +166,26 @@ def _path_of(entity: Any, label: str) -> Any:
     try:
         path = paths.make_path(entity)
     except Exception as error:  # splines without knots, ...
-        raise InputError(f"can't be read as a curve: {str(error)[:100]}", field=label) from None
+        raise InputError(
+            f"can't be read as a curve: {str(error)[:100]}", field=f"{label}{_begin(entity)}"
+        ) from None
     points = np.array([tuple(point) for point in path.control_vertices()]).reshape(-1, 3)
     if not (np.abs(points) <= LARGEST).all():
         raise InputError("is no curve: expected points within 1e60", field=label)
     return path if len(points) > 1 and np.ptp(points, axis=0).any() else None
+
+
+def _begin(entity: Any) -> str:
+    """Where an entity begins, as far as it says so: handles mean nothing to who draws."""
+    for name in ("start", "insert", "center"):
+        place = entity.dxf.get(name)
+        if place is not None:
+            return f" at {_place(place)}"
+    return ""
+
+
+def _place(point: Iterable[float]) -> str:
+    return f"({', '.join(f'{value:.6g}' for value in point)})"
 
 
 def _flattened(paths: Sequence[tuple[Any, str]]) -> Iterator[DrawnCurve]:
@@ -186,4 +201,7 @@ def _flattened(paths: Sequence[tuple[Any, str]]) -> Iterator[DrawnCurve]:
             else [tuple(point) for point in path.control_vertices()]
         )
         closed = path.is_closed and len(points) > 3
-        yield DrawnCurve(points[: len(points) - closed], closed, label)
+        kind, _, within = label.partition(" ")
+        block = f" {within.partition(' ')[2]}" if " " in within else ""
+        name = f"{kind}{block} from {_place(points[0])}"
+        yield DrawnCurve(points[: len(points) - closed], closed, name)

@@ -20,7 +20,7 @@ Result = SimulationResult | KitResult
 
 
 def to_pandas(result: Result) -> dict[str, Any]:
-    """The tables of a result as `pandas.DataFrame`s by name. Needs pandas, which comes with the
+    """The tables of a result by name, each a `pandas.DataFrame`. Needs pandas, which comes with the
     extra "pandas".
 
     result : of a kit optimisation: "designs", "elements", "joints", "rods" and "steps", see

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from ..plugins import Registry
 
 Bounds = Mapping[str, tuple]  # kind -> (lower, upper), each a number or an array (k_p,)
@@ -183,7 +183,10 @@ def part_kind(name: str) -> PartKind:
     kind = KINDS.get(name)
     if kind is None:
         raise InputError(
-            f"unknown kind of parts (known: {', '.join(kind_names())})", field="parts", value=name
+            f"unknown kind of parts ({did_you_mean(name, kind_names())}"
+            f"known: {', '.join(kind_names())})",
+            field="parts",
+            value=name,
         )
     return kind
 

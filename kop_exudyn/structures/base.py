@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from ..kit.groups import ElementGroup
 from ..plugins import Registry
 from ..units import Units, units_from_dict
@@ -288,7 +288,8 @@ def design_from_dict(data: Mapping[str, Any], source: str = "design") -> Design:
     reader = CLASSES.get(class_name)
     if reader is None:
         raise InputError(
-            f"unknown structure class (known: {', '.join(class_names())})",
+            f"unknown structure class ({did_you_mean(str(class_name), class_names())}"
+            f"known: {', '.join(class_names())})",
             source=source,
             field="class",
             value=class_name,

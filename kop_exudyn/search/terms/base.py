@@ -11,7 +11,7 @@ import numpy as np
 
 from ...equilibrium.equilibria import Equilibrium
 from ...equilibrium.sensitivities import Sensitivities
-from ...errors import InputError
+from ...errors import InputError, did_you_mean
 from ...plugins import Registry
 from ...structures.base import Design, Role, Target
 from ...structures.fitting import FitResult
@@ -91,7 +91,8 @@ def term_class(name: str) -> type[Term]:
     term = TERMS.get(name)
     if term is None:
         raise InputError(
-            f"unknown term of the objective (known: {', '.join(term_names())})",
+            f"unknown term of the objective ({did_you_mean(name, term_names())}"
+            f"known: {', '.join(term_names())})",
             field="weights",
             value=name,
         )
