@@ -71,7 +71,12 @@ def test_what_stops_a_kit_from_being_built_is_named_and_can_be_overruled(
         (designs / f"{name}.json").write_text(json.dumps(data))
     run = tmp_path / "run"
     stages = StageSettings(
-        schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2
+        schedule=(1e4,),
+        relaxed_steps=1,
+        assigned_steps=1,
+        reassignments=0,
+        path_steps=2,
+        effort="quick",
     )
     result = optimize_kit(
         load_designs(designs),

@@ -48,7 +48,12 @@ def run(tmp_path_factory):
             json.dumps(shell(name, bow)), encoding="utf-8"
         )
     stages = StageSettings(
-        schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2
+        schedule=(1e4,),
+        relaxed_steps=1,
+        assigned_steps=1,
+        reassignments=0,
+        path_steps=2,
+        effort="quick",
     )
     optimize_and_report(
         load_designs(folder / "designs", ["flat", "bent"]),

@@ -34,7 +34,12 @@ MM = Units("mm", "N")
 def result(shells):
     """One accepted step a stage: the files don't need more."""
     stages = StageSettings(
-        schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2
+        schedule=(1e4,),
+        relaxed_steps=1,
+        assigned_steps=1,
+        reassignments=0,
+        path_steps=2,
+        effort="quick",
     )
     settings = JobSettings(jobs=1, baselines=False, stages=stages)
     return optimize_kit(shells, {"linear": 3, "angular": 2}, settings=settings)

@@ -23,7 +23,12 @@ def result(shells):
         jobs=1,
         baselines=False,
         stages=StageSettings(
-            schedule=(1e4,), relaxed_steps=2, assigned_steps=2, reassignments=0, path_steps=3
+            schedule=(1e4,),
+            relaxed_steps=2,
+            assigned_steps=2,
+            reassignments=0,
+            path_steps=3,
+            effort="quick",
         ),
     )
     events = []

@@ -21,7 +21,12 @@ from kop_exudyn.structures.fitting import TargetFitting
 def finished(shells, tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     stages = StageSettings(
-        schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2
+        schedule=(1e4,),
+        relaxed_steps=1,
+        assigned_steps=1,
+        reassignments=0,
+        path_steps=2,
+        effort="quick",
     )
     events = []
     result = optimize_kit(

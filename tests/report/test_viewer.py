@@ -94,7 +94,12 @@ def shell(name, bow):
 def result():
     designs = [shell("flat", 0.1), shell("bent", 0.16)]
     stages = StageSettings(
-        schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2
+        schedule=(1e4,),
+        relaxed_steps=1,
+        assigned_steps=1,
+        reassignments=0,
+        path_steps=2,
+        effort="quick",
     )
     return optimize_kit(
         designs,

@@ -132,7 +132,12 @@ def test_kits_of_turned_designs_are_the_same(repository):
                 )
             )
         stages = StageSettings(
-            schedule=(1e4,), relaxed_steps=2, assigned_steps=2, reassignments=0, path_steps=2
+            schedule=(1e4,),
+            relaxed_steps=2,
+            assigned_steps=2,
+            reassignments=0,
+            path_steps=2,
+            effort="quick",
         )
         settings = JobSettings(jobs=1, baselines=False, stages=stages)
         kits.append(optimize_kit(designs, {"linear": 6, "angular": 3}, settings=settings))
