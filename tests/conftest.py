@@ -130,17 +130,3 @@ def clustering(shells):
 @pytest.fixture(scope="session")
 def parts(shells, clustering):
     return parts_list(clustering.kit, clustering.assignment, shells)
-
-
-# Faults that are known and not mended yet, each with what is wrong: the tests stay as they are, and
-# an entry goes when its fault does.
-KNOWN_FAULTS = {
-    "test_commands_print_what_the_page_shows": "the page's figures wait for another run",
-}
-
-
-def pytest_collection_modifyitems(items):
-    for item in items:
-        for name in (item.name, item.name.partition("[")[0]):
-            if name in KNOWN_FAULTS:
-                item.add_marker(pytest.mark.xfail(reason=KNOWN_FAULTS[name], strict=False))
