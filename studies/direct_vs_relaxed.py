@@ -1,25 +1,35 @@
-"""What the two stages gain over direct projection.
+"""What the two stages gain over the baselines.
 
     python studies/direct_vs_relaxed.py [--quick] [--out reports/direct_vs_relaxed] [--jobs 2]
 
 A kit can be had at once: cluster the elements of all input designs, and replace each element by its
-nearest part (direct). The parts can then be tuned (unrelaxed). The method instead lets all elements
-move before they become parts (relaxed), and tunes the parts and their assignment at the end
-(assigned). All four are computed for kits of three classes of structures, and every state shown is
-an equilibrium that Exudyn confirmed. Deviations are distances of the joints from the target surface
-in % of its size.
+nearest part (direct). The parts can then be tuned (unrelaxed). The method of Becker et al. (2024)
+lets all elements move before they become parts, with BFGS, and keeps the assignment (published;
+opened: the state that its designs open into). Ours relaxes too (relaxed), and tunes parts and
+assignment at the end, for designs that open by themselves and keep below their limits (assigned).
+All are computed for kits of three classes of structures with as many parts, beside what the inputs
+themselves deviate, and every state shown is an equilibrium that Exudyn confirmed. Deviations are
+distances of the joints from the target surface, in % of its size.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
-from kop_exudyn.report.designs import DrawnDesign, draw_designs
+from kop_exudyn.report.designs import draw_designs
 from kop_exudyn.report.kit_drawings import drawn_stages
 from kop_exudyn.search.result import STAGES
-from lib.comparison import comparison_rows, draw_comparison, finding
+from lib.comparison import (
+    DEVIATIONS_SHOWN,
+    STAGES_SHOWN,
+    comparison_rows,
+    draw_comparison,
+    finding,
+    most_changed,
+)
 from lib.study import Study
-from lib.study_kits import kits
+from lib.study_kits import kits_of, three_classes
 
 ROOT = Path(__file__).resolve().parents[1]
 SHOWN = 3  # designs of each class in the pictures: those that gain most
@@ -29,7 +39,8 @@ def main() -> None:
     study = Study.from_command_line(__doc__, __file__)
 
     # 1. One kit a class: all four stages, kept in the folder of runs.
-    results = kits(study, ROOT / "models")
+    cases = three_classes(ROOT / "models", study.quick)
+    results = kits_of(study, [replace(case, published=True) for case in cases])
 
     # 2. What came out, design by design and in a sentence.
     rows = [row for name, result in results.items() for row in comparison_rows(name, result)]
@@ -38,15 +49,13 @@ def main() -> None:
     report.figure(
         "deviations",
         draw_comparison(rows),
-        "Largest deviation of every design after each stage, logarithmic. A cross at the right: no "
-        "equilibrium was found, or Exudyn didn't confirm it. A ring: it buckled into another "
-        "state: led back to the elements of the input, it doesn't come back to the input's shape.",
-        alt="Deviation of all designs after the four stages",
+        STAGES_SHOWN,
+        alt="Deviation of all designs: inputs, baselines and both stages",
     )
     report.table(
         "designs",
         [{key: row[key] for key in row if not key.endswith("energy")} for row in rows],
-        "Deviations of the joints in % of the target's size. Failed: no equilibrium was found.",
+        DEVIATIONS_SHOWN,
     )
     report.table(
         "energies",
@@ -66,7 +75,7 @@ def main() -> None:
         )
         report.figure(
             name.replace(" ", "_"),
-            draw_designs(most_changed(drawn_stages(result, STAGES))),
+            draw_designs(most_changed(drawn_stages(result, STAGES), SHOWN)),
             "Equilibria at their best placement on the target; grey: the input design. Joints are "
             "coloured "
             f"by their deviation. Of {len(result.designs)} designs those that direct projection "
@@ -75,16 +84,6 @@ def main() -> None:
             alt=f"The {name} after direct projection, unrelaxed, relaxed and assigned",
         )
     report.save({"finding": outcome, "designs": rows})
-
-
-def most_changed(designs: list[DrawnDesign]) -> list[DrawnDesign]:
-    """The designs with the largest deviations after direct projection; failures first."""
-
-    def deviation(design: DrawnDesign) -> float:
-        state = design.states[0]
-        return float("inf") if state.failed is not None else max(state.deviation_percent)
-
-    return sorted(designs, key=deviation, reverse=True)[:SHOWN]
 
 
 if __name__ == "__main__":

@@ -47,13 +47,12 @@ def main() -> None:
             robustness_of_run,
             {
                 "run": run_folder(case, study) / "result.json",
-                "number": case.number,
+                "files": list(case.files),
                 "share": SHARE,
                 "angle": ANGLE,
                 "factors": factors,
                 "samples": samples,
             },
-            {"models": str(case.folder)},
         )
         for case in cases
     ]

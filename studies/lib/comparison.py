@@ -1,5 +1,8 @@
-"""Direct, unrelaxed, relaxed and assigned designs compared: rows of a table, a figure, a
-sentence."""
+"""Inputs, baselines and both stages compared, design by design: rows of a table, a figure, a
+sentence.
+
+`ORDER` has what is compared: the input, on no kit's account; the baselines; then our own stages.
+"""
 
 from __future__ import annotations
 
@@ -12,19 +15,45 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from kop_exudyn.drawing.style import INK, PALETTE, QUIET, style
+from kop_exudyn.report.designs import DrawnDesign
 from kop_exudyn.search.buckling import buckled
 from kop_exudyn.search.result import STAGES, KitResult
 
 Row = Mapping[str, Any]
 
+ORDER = ("input", *STAGES)
+STAGES_SHOWN = (
+    "Largest deviation of every design, logarithmic. Input: before any kit. Published, opened: the "
+    "state that the designs of the published method open into. Assigned: the kit found here. A "
+    "cross at the right: no equilibrium was found, or Exudyn didn't confirm it. A ring: it buckled "
+    "into another state: led back to the elements of the input, it doesn't come back to the "
+    "input's shape."
+)
+DEVIATIONS_SHOWN = (
+    "Deviations of the joints in % of the size. Utilisation: the largest of all states, of the "
+    "elastic limit. Snapped: of the samples with the workshop's errors, those that end in another "
+    "state. Failed: no equilibrium was found."
+)
 _COLOURS = {
+    "input": QUIET,
     "direct": PALETTE["vermillion"],
     "unrelaxed": PALETTE["orange"],
+    "published": PALETTE["purple"],
+    "published_opened": PALETTE["purple"],
     "relaxed": PALETTE["sky"],
     "assigned": PALETTE["blue"],
 }
+_LEAST_SHOWN = 1e-3  # %: what deviates less is drawn here
 _RING, _AROUND = 110, {"marker": "o", "facecolors": "none", "edgecolors": INK, "linewidths": 1.2}
-_MARKERS = {"direct": "s", "unrelaxed": "^", "relaxed": "D", "assigned": "o"}
+_MARKERS = {
+    "input": "|",
+    "direct": "s",
+    "unrelaxed": "^",
+    "published": "v",
+    "published_opened": "P",
+    "relaxed": "D",
+    "assigned": "o",
+}
 
 
 def comparison_rows(class_name: str, result: KitResult) -> list[dict[str, Any]]:
@@ -38,12 +67,14 @@ def comparison_rows(class_name: str, result: KitResult) -> list[dict[str, Any]]:
             "design": design.name,
             "elements": design.n_elements,
         }
-        row |= {f"{stage} max %": _fit(found.get(stage), "max_percent") for stage in STAGES}
+        shown = {"input": result.input_summary(n), **found}
+        row |= {f"{stage} max %": _fit(summary, "max_percent") for stage, summary in shown.items()}
         row |= {
-            f"{stage} mean %": _fit(found.get(stage), "mean_percent")
+            f"{stage} mean %": _fit(shown.get(stage), "mean_percent")
             for stage in ("direct", "assigned")
         }
-        row |= {f"{stage} energy": found.get(stage, {}).get("energy_ratio") for stage in STAGES}
+        row |= _verdict(result, n)
+        row |= {f"{stage} energy": summary.get("energy_ratio") for stage, summary in found.items()}
         row["buckled"] = (
             ", ".join(
                 stage
@@ -59,36 +90,89 @@ def comparison_rows(class_name: str, result: KitResult) -> list[dict[str, Any]]:
     return rows
 
 
+def _verdict(result: KitResult, number: int) -> dict[str, Any]:
+    """Whether a design can be built, its largest utilisation of all states, and how many samples
+    of the workshop's errors snap."""
+    if not result.buildable:
+        return {}
+    found = result.buildable[number]
+    used = [value for value in (found.get("utilisation") or {}).values() if value is not None]
+    tolerance = found.get("tolerance") or {}
+    return {
+        "buildable": found.get("verdict"),
+        "utilisation": max(used) if used else None,
+        "snapped": f"{tolerance['snapped']} of {tolerance['samples']}" if tolerance else None,
+    }
+
+
 def finding(rows: Sequence[Row]) -> str:
-    """What the rows say, in a sentence or two."""
-    direct, unrelaxed, assigned = (
-        _values(rows, f"{stage} max %") for stage in ("direct", "unrelaxed", "assigned")
+    """What the rows say, in a few sentences: first what the method gains, then where it is worse
+    than a baseline, then what can't be built."""
+    names = {"direct": "direct", "unrelaxed": "unrelaxed", "published_opened": "published method"}
+    values = {stage: _values(rows, f"{stage} max %") for stage in (*names, "assigned")}
+    medians = ", ".join(
+        f"{np.median(values[stage]):.2g} % ({name})"
+        for stage, name in names.items()
+        if values[stage]
     )
-    sentences = [
-        f"Over {len(rows)} designs the median of the largest deviation falls from "
-        f"{np.median(direct):.2g} % "
-        f"(direct) and {np.median(unrelaxed):.2g} % (unrelaxed) to {np.median(assigned):.2g} % "
-        f"(assigned); "
-        f"the worst design ends at {max(assigned):.2g} %, after direct projection it is "
-        f"{max(direct):.2g} % "
-        "off."
+    sentences = []
+    if values["assigned"]:
+        sentences.append(
+            f"Over {len(rows)} designs the median of the largest deviation is "
+            f"{np.median(values['assigned']):.2g} % with the kit found here, as the designs open; "
+            f"before: {medians}. The worst design ends at {max(values['assigned']):.2g} %."
+        )
+    worse = [
+        f"{row['design']} ({name}: {row[key]:.2g} %, here {row['assigned max %']:.2g} %)"
+        for row in rows
+        for key, name in ((f"{stage} max %", name) for stage, name in names.items())
+        if row.get(key) is not None
+        and row["assigned max %"] is not None
+        and row[key] < row["assigned max %"]
     ]
+    if worse:
+        sentences.append(f"Worse than a baseline: {', '.join(worse)}.")
+    off = [row for row in rows if (row["input max %"] or 0.0) > 0.25]
+    if off:
+        sentences.append(
+            "Inputs that are off their targets themselves: "
+            + ", ".join(f"{row['design']} ({row['input max %']:.2g} %)" for row in off)
+            + "."
+        )
+    stopped = [row["design"] for row in rows if row.get("buildable") not in (None, "can be built")]
+    if any("buildable" in row for row in rows):
+        sentences.append(
+            f"Not to be built as they are: {', '.join(stopped)}."
+            if stopped
+            else "All of them open by themselves, keep below their limits and can be built."
+        )
     away = [f"{row['design']} ({row['buckled']})" for row in rows if row["buckled"] != "–"]
-    sentences.append(
-        f"Buckled into other states: {', '.join(away)}." if away else "None has buckled."
-    )
+    if away:
+        sentences.append(f"Buckled into other states: {', '.join(away)}.")
     failed = [f"{row['design']} ({row['failed']})" for row in rows if row["failed"] != "–"]
     if failed:
         sentences.append(f"No equilibrium was found for {', '.join(failed)}.")
     return " ".join(sentences)
 
 
+def most_changed(designs: list[DrawnDesign], number: int) -> list[DrawnDesign]:
+    """The designs with the largest deviations after direct projection; failures first."""
+
+    def deviation(design: DrawnDesign) -> float:
+        state = design.states[0]
+        return float("inf") if state.failed is not None else max(state.deviation_percent)
+
+    return sorted(designs, key=deviation, reverse=True)[:number]
+
+
 def draw_comparison(rows: Sequence[Row]) -> Figure:
     """Every design a line, its stages markers on a logarithmic axis of the largest deviation;
     rings: buckled."""
-    stages = [stage for stage in STAGES if any(row[f"{stage} max %"] is not None for row in rows)]
-    values = [row[f"{stage} max %"] for row in rows for stage in stages if row[f"{stage} max %"]]
-    low, high = 0.6 * min(values), 2.0 * max(values)
+    stages = [
+        stage for stage in ORDER if any(row.get(f"{stage} max %") is not None for row in rows)
+    ]
+    values = [row[key] for row in rows for stage in stages if row.get(key := f"{stage} max %")]
+    low, high = 0.6 * max(min(values), _LEAST_SHOWN), 2.0 * max(values)
     with style():
         figure = Figure(figsize=(8.5, 1.3 + 0.3 * len(rows)), layout="constrained")
         ax = figure.subplots()
@@ -105,20 +189,27 @@ def draw_comparison(rows: Sequence[Row]) -> Figure:
         ax.grid(axis="y", visible=False)
         _mark_classes(ax, rows, low)
         for stage in stages:
-            ax.scatter([], [], color=_COLOURS[stage], marker=_MARKERS[stage], s=34, label=stage)
+            ax.scatter(
+                [],
+                [],
+                color=_COLOURS[stage],
+                marker=_MARKERS[stage],
+                s=34,
+                label=stage.replace("_", ", "),
+            )
         ax.scatter([], [], s=_RING, label="buckled", **_AROUND)
-        figure.legend(loc="outside lower center", ncols=len(stages) + 1)
+        figure.legend(loc="outside lower center", ncols=min(len(stages) + 1, 5))
     return figure
 
 
 def _draw_row(ax: Axes, y: int, row: Row, stages: Sequence[str], failed_at: float) -> None:
-    found = {stage: row[f"{stage} max %"] for stage in stages}
-    there = [value for value in found.values() if value is not None]
+    found = {stage: row.get(f"{stage} max %") for stage in stages}
+    there = [max(value, _LEAST_SHOWN) for value in found.values() if value is not None]
     if there:
         ax.hlines(y, min(there), max(there), color="#d8d8d8", linewidth=3, zorder=1)
     for stage, value in found.items():
         missing = value is None
-        x = failed_at if missing else value
+        x = failed_at if missing else max(value, _LEAST_SHOWN)
         ax.scatter(
             x, y, color=_COLOURS[stage], marker="x" if missing else _MARKERS[stage], s=34, zorder=3
         )
@@ -149,4 +240,4 @@ def _fit(summary: Mapping[str, Any] | None, name: str) -> float | None:
 
 
 def _values(rows: Sequence[Row], key: str) -> list[float]:
-    return [row[key] for row in rows if row[key] is not None]
+    return [row[key] for row in rows if row.get(key) is not None]

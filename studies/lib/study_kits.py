@@ -3,13 +3,14 @@ reports."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.checkpoint import Job
-from kop_exudyn.io.datasets import load_designs, select_files
+from kop_exudyn.io.datasets import select_files
+from kop_exudyn.io.designs import load_design
 from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.report.kit_run import optimize_and_report, within_workshop
 from kop_exudyn.search.result import KitResult
@@ -18,6 +19,7 @@ from kop_exudyn.search.settings import JobSettings, StageSettings
 
 from .study import Study
 
+RELEASED = ("saddle_5t", "hemisphere_5t", "lilium", "sphere_cap_0.3")
 QUICK_STAGES = StageSettings(
     relaxed_steps=1,
     assigned_steps=1,
@@ -33,22 +35,19 @@ QUICK_STAGES = StageSettings(
 class KitCase:
     """What a kit is asked for.
 
-    name : of the class, as a reader knows it
-    folder : of design files; number : of them, in order of their names (None: all)
+    name : of the class or data set, as a reader knows it
+    files : of the designs
     parts : kind -> number of parts
     baselines : whether the unrelaxed baseline is computed as well
+    published : whether the published method is run as well, for comparison
     """
 
     name: str
-    folder: Path
-    number: int | None
+    files: Sequence[Path]
     parts: Mapping[str, int]
     stages: StageSettings = StageSettings()
     baselines: bool = True
-
-    @property
-    def files(self) -> list[Path]:
-        return select_files(self.folder, self.number)
+    published: bool = False
 
 
 def three_classes(models: Path, quick: bool = False) -> list[KitCase]:
@@ -56,16 +55,53 @@ def three_classes(models: Path, quick: bool = False) -> list[KitCase]:
     hardly any steps."""
     stages = QUICK_STAGES if quick else StageSettings()
     beams = {"linear": 12, "angular": 5}
+
+    def files(folder: str, number: int | None = None) -> list[Path]:
+        return select_files(models / folder, 1 if quick else number)
+
     return [
-        KitCase("C-shells", models / "conformals", 1 if quick else 3, beams, stages),
-        KitCase("grids", models / "grids", 1 if quick else None, beams, stages),
-        KitCase("umbrella meshes", models / "umbrellas", 1 if quick else None, {"cell": 8}, stages),
+        KitCase("C-shells", files("conformals", 3), beams, stages),
+        KitCase("grids", files("grids"), beams, stages),
+        KitCase("umbrella meshes", files("umbrellas"), {"cell": 8}, stages),
     ]
+
+
+def data_sets(models: Path, released: Path, quick: bool = False) -> list[KitCase]:
+    """As many designs as were published, and more, of outlines and curvatures that differ.
+
+    released : folder of the published umbrella meshes; their set is left out where they aren't at
+        hand
+    quick : one design each and hardly any steps
+    """
+    stages = QUICK_STAGES if quick else StageSettings()
+    count = 1 if quick else None
+    shells = [
+        *select_files(models / "conformals", count or 5),
+        *select_files(models / "patches", count or ["fan", "hexagon", "ring", "skew", "triangle"]),
+    ]
+    grids = [
+        *select_files(models / "grids", count),
+        *([] if quick else select_files(models / "grids_hard")),
+    ]
+    large = select_files(models / "umbrellas" if quick else models / "umbrellas_large", count)
+    cases = [
+        KitCase("ten C-shells", shells, {"linear": 8, "angular": 5}, stages),
+        KitCase("large umbrella meshes", large, {"cell": 8}, stages),
+        KitCase("seven grids", grids, {"linear": 8, "angular": 5}, stages),
+    ]
+    published = [released / f"{name}.json.gz" for name in RELEASED]
+    if not quick and all(file.is_file() for file in published):
+        cases.append(KitCase("released umbrella meshes", published, {"cell": 8}, stages))
+    return cases
 
 
 def kits(study: Study, models: Path) -> dict[str, KitResult]:
     """The kits of the three classes by name."""
-    cases = three_classes(models, study.quick)
+    return kits_of(study, three_classes(models, study.quick))
+
+
+def kits_of(study: Study, cases: Sequence[KitCase]) -> dict[str, KitResult]:
+    """The kits of several cases by name."""
     found = {case.name: kit_of(case, run_folder(case, study), study.jobs) for case in cases}
     study.kits_s |= {name: result.wall_s for name, result in found.items()}
     return found
@@ -84,9 +120,12 @@ def kit_of(case: KitCase, folder: Path, jobs: int) -> KitResult:
 
     Raises InputError and SimulationFailure as `optimize_and_report` does.
     """
-    designs, files = load_designs(case.folder, case.number), case.files
+    designs, files = [load_design(file) for file in case.files], list(case.files)
     settings = within_workshop(
-        designs, JobSettings(stages=case.stages, jobs=jobs, baselines=case.baselines)
+        designs,
+        JobSettings(
+            stages=case.stages, jobs=jobs, baselines=case.baselines, published=case.published
+        ),
     )
     record = folder / "checkpoints" / "job.json"
     job = Job.of(described_job(designs, case.parts, None, settings), files)

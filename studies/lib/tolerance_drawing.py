@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator
 from kop_exudyn.analysis.tolerance import robustness
 from kop_exudyn.drawing.style import CYCLE, style
 from kop_exudyn.errors import SimulationFailure
-from kop_exudyn.io.datasets import load_designs
+from kop_exudyn.io.designs import load_design
 from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.report.designs import DrawnDesign, DrawnState
 from kop_exudyn.report.kit_drawings import drawn_state
@@ -24,8 +24,7 @@ Found = Mapping[str, Any]  # see `robustness`
 
 def robustness_of_run(
     run: Path,
-    models: str,
-    number: int | None,
+    files: Sequence[Path],
     share: float,
     angle: float,
     factors: Sequence[float],
@@ -33,10 +32,10 @@ def robustness_of_run(
 ) -> dict[str, Any]:
     """Robustness of all assigned designs of a finished run, with what is needed to draw them.
 
-    run : its result.json; models, number : of its designs' files
+    run : its result.json; files : of its designs
     share, angle : standard deviations, of lengths as a share of the median one, of angles in rad
     """
-    result = load_run(run.parent, load_designs(models, number))
+    result = load_run(run.parent, [load_design(file) for file in files])
     found = []
     for design, outcome in zip(result.designs, result.stages["assigned"].designs):
         if isinstance(outcome, SimulationFailure):

@@ -1,0 +1,82 @@
+"""Kits for as many designs as were published, and harder ones.
+
+    python studies/data_sets.py [--quick] [--out reports/data_sets] [--jobs 2]
+
+Ten C-shells share 8 linear and 5 angular parts, as the ten of Becker et al. (2024) do: five
+conformal images of a square, and a fan, a hexagon, a ring, a skew net and a triangle. Five umbrella
+meshes of 84 to 150 cells, one of them on supports, share 8 cells. Seven grids, one of strongly
+varying curvature, share 8 + 5 parts. Four released umbrella meshes share 8 cells (read from beside
+the repository, left out where they aren't). Every table has the inputs and the baselines beside the
+kit: see the study `direct_vs_relaxed`. Deviations are distances of the joints from the target
+surface, in % of its size.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from kop_exudyn.report.designs import draw_designs
+from kop_exudyn.report.kit_drawings import drawn_stages
+from lib.comparison import (
+    DEVIATIONS_SHOWN,
+    STAGES_SHOWN,
+    comparison_rows,
+    draw_comparison,
+    finding,
+    most_changed,
+)
+from lib.study import Study
+from lib.study_kits import data_sets, kits_of
+
+ROOT = Path(__file__).resolve().parents[1]
+SHOWN = 4  # designs of each set in the pictures
+COLUMNS = ("direct", "assigned")
+
+
+def main() -> None:
+    study = Study.from_command_line(__doc__, __file__)
+
+    # 1. One kit a set, kept in the folder of runs.
+    cases = data_sets(ROOT / "models", ROOT.parent / "shared" / "data" / "umbrella", study.quick)
+    results = kits_of(study, cases)
+
+    # 2. What came out, design by design and in a few sentences.
+    rows = [row for name, result in results.items() for row in comparison_rows(name, result)]
+    outcome = finding(rows)
+    report = study.report(outcome)
+    report.figure(
+        "deviations",
+        draw_comparison(rows),
+        STAGES_SHOWN,
+        alt="Deviation of all designs: inputs, baselines and both stages",
+    )
+    report.table(
+        "designs",
+        [{key: row[key] for key in row if not key.endswith("energy")} for row in rows],
+        DEVIATIONS_SHOWN,
+    )
+
+    # 3. The designs, set by set.
+    for name, result in results.items():
+        sizes = " and ".join(f"{count} {kind}" for kind, count in result.kit.sizes.items())
+        elements = sum(design.n_elements for design in result.designs)
+        joints = [len(design.joints) for design in result.designs]
+        report.section(
+            name,
+            f"{sizes} parts realise {elements} elements of {len(result.designs)} designs of "
+            f"{min(joints)} to {max(joints)} joints; the search took {result.wall_s / 60:.0f} min. "
+            + " ".join(result.verdict),
+        )
+        report.figure(
+            name.replace(" ", "_"),
+            draw_designs(most_changed(drawn_stages(result, COLUMNS), SHOWN)),
+            "Equilibria at their best placement on the target; grey: the input design. Joints are "
+            f"coloured by their deviation. Of {len(result.designs)} designs those that direct "
+            "projection leaves farthest off are shown.",
+            alt=f"The {name} after direct projection and with the kit found here",
+        )
+    report.save({"finding": outcome, "designs": rows})
+
+
+if __name__ == "__main__":
+    main()
