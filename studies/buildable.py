@@ -25,6 +25,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from kop_exudyn.drawing.style import PALETTE, style
+from kop_exudyn.io.datasets import select_files
 from kop_exudyn.report.designs import DrawnDesign, draw_designs
 from kop_exudyn.report.kit_drawings import drawn_state
 from kop_exudyn.search.objective import Evaluation
@@ -61,7 +62,7 @@ def main() -> None:
     for case in cases[:1] if study.quick else cases:
         found[case.name] = {}
         folder = run_folder(replace(case, name=f"{case.name} with snow"), study)
-        loaded = replace(case, folder=with_snow(case.files, folder), number=None)
+        loaded = replace(case, files=select_files(with_snow(list(case.files), folder)))
         for level in levels:
             result = kit_of(*required(loaded, level, LEVELS[level], study), study.jobs)
             study.kits_s[f"{case.name}, {level}"] = result.wall_s
