@@ -22,6 +22,10 @@ _SIZE = (1080, 720)  # pixels of a picture at most: drawn half as large, sharp o
 _IMAGE = re.compile(r'<img src="data:image/(png|svg\+xml);base64,([^"]+)"')
 _LARGEST_SVG = 400_000  # characters; larger drawings would make the index heavy
 _SENTENCE = re.compile(r"(?<=[a-z0-9%)°])\.\s+(?=[A-Z])")  # the end of one
+_OLD = (
+    "<h2>Of earlier versions</h2>\n<p>These reports were made by earlier versions of the program, "
+    "on earlier models. Their figures don't hold for the present ones.</p>"
+)
 _STYLE = """.story, .reports { display: grid; padding: 0; margin: 1.6rem 0; gap: 1.5rem; }
 .story { grid-template-columns: repeat(auto-fill, minmax(min(100%, 27rem), 1fr)); }
 .reports { grid-template-columns: repeat(auto-fill, minmax(17rem, 1fr)); }
@@ -37,6 +41,7 @@ _STYLE = """.story, .reports { display: grid; padding: 0; margin: 1.6rem 0; gap:
 .story .first img { max-width: 100%; max-height: 34rem; }
 .index h3 { font-size: 1.1rem; margin: .8rem 1rem .2rem; } .reports h3 { font-size: .98rem; }
 .index p { font-size: .92rem; margin: 0 1rem 1rem; }
+.index p.made { font-size: .78rem; opacity: .75; margin-top: -.6rem; }
 @media (max-width: 720px) { .index .picture { height: auto; padding: .4rem; } }
 """
 
@@ -59,12 +64,15 @@ class Entry:
     """One report.
 
     name : of its folder; title, finding : plain text; picture : a data URI, or None
+    made : when and by which commit, empty where the report doesn't say: those are of times before
+        reports did
     """
 
     name: str
     title: str
     finding: str
     picture: str | None
+    made: str = ""
 
 
 def write_index(folder: str | Path, title: str, lead: str, story: Sequence[Chapter] = ()) -> Path:
@@ -72,7 +80,8 @@ def write_index(folder: str | Path, title: str, lead: str, story: Sequence[Chapt
     own.
 
     story : the figures that the page leads with, in their order, as far as there are such reports;
-        the other reports follow
+        the other reports follow; those that don't say which commit made them come last, under a
+        heading that says so
 
     Titles and pictures are taken from each report's page, findings from its data.json, or else from
     the page's lead. Raises InputError when there is no report, or the page can't be written.
@@ -84,10 +93,11 @@ def write_index(folder: str | Path, title: str, lead: str, story: Sequence[Chapt
     told = [
         replace(entry_of(pages[one.name], one.picture), title=one.headline)
         for one in story
-        if one.name in pages
+        if one.name in pages and _made(pages[one.name])
     ]
-    others = [entry_of(path) for name, path in pages.items() if name not in {e.name for e in told}]
-    return write_text(folder / "index.html", _html(told, others, title, lead), overwrite=True)
+    rest = [entry_of(path) for name, path in pages.items() if name not in {e.name for e in told}]
+    others, old = [e for e in rest if e.made], [e for e in rest if not e.made]
+    return write_text(folder / "index.html", _html(told, others, old, title, lead), overwrite=True)
 
 
 def entry_of(folder: Path, picture: int | None = None) -> Entry:
@@ -103,7 +113,18 @@ def entry_of(folder: Path, picture: int | None = None) -> Entry:
         _text(page, "h1") or folder.name,
         first_sentence(finding or _text(page, "p") or ""),
         _picture(folder, page, picture),
+        _made(folder),
     )
+
+
+def _made(folder: Path) -> str:
+    """When a report was made and by which commit, from its data; empty where they don't say."""
+    for name in ("data.json", "result.json"):
+        if (folder / name).exists():
+            made = read_json(folder / name).get("environment") or {}
+            if made.get("commit"):
+                return f"{made.get('date', '')}, commit {made['commit']}"
+    return ""
 
 
 def first_sentence(text: str) -> str:
@@ -139,7 +160,7 @@ def _thumbnail(content: bytes) -> str:
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
 
 
-def _html(told: list[Entry], others: list[Entry], title: str, lead: str) -> str:
+def _html(told: list[Entry], others: list[Entry], old: list[Entry], title: str, lead: str) -> str:
     css = (files("kop_exudyn.report") / "page.css").read_text(encoding="utf-8")
     policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
     return "\n".join(
@@ -159,6 +180,8 @@ def _html(told: list[Entry], others: list[Entry], title: str, lead: str) -> str:
             *_list("story", told),
             *(["<h2>More of what was tried</h2>"] if told and others else []),
             *_list("reports", others),
+            *([_OLD] if old else []),
+            *_list("reports", old),
             "</body>",
             "</html>",
             "",
@@ -177,5 +200,6 @@ def _item(entry: Entry, number: int) -> str:
     return (
         f'<li{"" if number else " class=first"}><a href="{escape(entry.name)}/index.html">'
         f'<div class="picture">{image}</div>'
-        f"<h3>{escape(entry.title)}</h3><p>{escape(entry.finding)}</p></a></li>"
+        f"<h3>{escape(entry.title)}</h3><p>{escape(entry.finding)}</p>"
+        f'<p class="made">{escape(entry.made)}</p></a></li>'
     )

@@ -43,13 +43,17 @@ def test_a_folder_without_reports_is_an_error(tmp_path):
 
 
 def test_the_story_comes_first_in_its_order(tmp_path):
-    """Headlines instead of titles, one sentence each; reports that aren't there are left out."""
-    for name in ("a", "b", "c"):
-        report(tmp_path / name, f"Title {name}", data={"finding": f"First of {name}. Second."})
-    story = (Chapter("c", "Gain c"), Chapter("missing", "Nothing"), Chapter("a", "Gain a"))
+    """Headlines instead of titles, one sentence each; reports that aren't there are left out; those
+    of unknown commits come last, also where the story names them."""
+    for name in ("a", "b", "c", "old"):
+        made = {} if name == "old" else {"environment": {"commit": "abc", "date": "2026-01-02"}}
+        finding = {"finding": f"First of {name}. Second."}
+        report(tmp_path / name, f"Title {name}", data=finding | made)
+    story = tuple(Chapter(name, f"Gain {name}") for name in ("c", "missing", "a", "old"))
     page = write_index(tmp_path, "All", "Lead.", story).read_text()
-    order = [page.index(text) for text in ("Gain c", "First of c.", "Gain a", "More of", "Title b")]
-    assert order == sorted(order) and "Title c" not in page and "Nothing" not in page
+    told = ("Gain c", "First of c.", "2026-01-02, commit abc", "Gain a", "More of", "Title b")
+    order = [page.index(text) for text in (*told, "earlier versions", "Title old")]
+    assert order == sorted(order) and "Title c" not in page and "Gain missing" not in page
     assert "Second" not in page
 
 
