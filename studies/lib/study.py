@@ -157,9 +157,8 @@ class Study:
         return {name: result.value for name, result in found.items()}
 
     def report(self, outcome: str) -> StudyReport:
-        """The report's beginning: what was tried, on what, and with what result."""
-        tried, _, further = self.about.partition("\n\n")
-        return StudyReport(self, Page(self.title, f"{tried} {outcome}").text(further))
+        """The report's beginning: what was found; then what was tried, and on what."""
+        return StudyReport(self, Page(self.title, outcome).text(self.about))
 
     @contextmanager
     def _progress(self, total: int) -> Iterator[tqdm]:

@@ -61,7 +61,8 @@ def test_a_report_leaves_page_figures_tables_and_data(tmp_path):
     assert study.out == out and study.quick
     page = (out / "index.html").read_text()
     assert (
-        '<p class="lead">Squares of whole numbers are computed one by one. They grow.</p>' in page
+        '<p class="lead">They grow.</p>\n<p>Squares of whole numbers are computed one by one.</p>'
+        in page
     )
     assert (
         "A second paragraph." in page
