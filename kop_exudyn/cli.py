@@ -17,7 +17,7 @@ from typing import NoReturn
 from . import __version__
 from .commands import NAMES
 from .commands.colour import RED, LogFormatter, coloured
-from .errors import InputError, SimulationFailure, did_you_mean
+from .errors import InputError, OccupiedError, SimulationFailure, did_you_mean
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -91,14 +91,6 @@ def _as_typed(error: InputError, options: set[str]) -> str:
     return f"--{option[2:]}{text[len(head) :]}" if option in options else text
 
 
-def _with_way_out(text: str, options: set[str]) -> str:
-    """What to do about files that are there already, where the command has an option for it."""
-    there = re.search(r"exists already$|an earlier run|a different job", text)
-    if not there or "--overwrite" not in options:
-        return text
-    return f"{text.replace(': choose another or allow overwriting', '')} (--overwrite replaces it)"
-
-
 def main(argv: Sequence[str] | None = None) -> int:
     """Run ``kop`` with these arguments (default: those of the process); returns the exit status."""
     args, unknown = make_parser().parse_known_args(argv)
@@ -114,7 +106,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         return status
     except InputError as error:
         options = args.command.options()
-        return _complain(_with_way_out(_as_typed(error, options), options), BAD_INPUT)
+        text = _as_typed(error, options)
+        if isinstance(error, OccupiedError) and "--overwrite" in options:
+            text += " (--overwrite replaces it)"
+        return _complain(text, BAD_INPUT)
     except SimulationFailure as failure:
         return _complain(f"simulation failed: {failure}", FAILED)
     except KeyboardInterrupt:

@@ -34,16 +34,24 @@ class InputError(ValueError):
 
     def at(self, source: Any) -> InputError:
         """The same error, with the file that it came from filled in where it was unknown."""
-        return InputError(
+        return type(self)(
             self.message, source=self.source or source, field=self.field, value=self.value
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuild_input_error, (self.message, self.source, self.field, self.value)
+        return _rebuild_input_error, (
+            type(self), self.message, self.source, self.field, self.value,
+        )  # fmt: skip
 
 
-def _rebuild_input_error(message: str, source: Any, field: str | None, value: Any) -> InputError:
-    return InputError(message, source=source, field=field, value=value)
+class OccupiedError(InputError):
+    """A place to write to holds something already, which is replaced where that is allowed."""
+
+
+def _rebuild_input_error(
+    kind: type[InputError], message: str, source: Any, field: str | None, value: Any
+) -> InputError:
+    return kind(message, source=source, field=field, value=value)
 
 
 class SimulationFailure(RuntimeError):

@@ -605,13 +605,18 @@ class TestSizes:
         ("simulate DESIGN --engine exudin", "did you mean 'exudyn'"),
         ("optimize FOLDER --parts linera=3 --out OUT", "--parts = 'linera'.*did you mean 'linear'"),
         ("view DESIGN --out DESIGN", "exists already .--overwrite replaces it"),
+        ("optimize FOLDER --parts linear=2,angular=2 --out FULL", "overwriting .--overwrite repl"),
         ("import no.dxf --out a.json", "no.dxf: no such file"),
         ("export none FOLDER --out OUT", "none: no such folder"),
     ],
 )
 def test_messages_say_what_was_meant(line, message, repository, tmp_path, capsys):
     small = repository / "models" / "small"
+    full = tmp_path / "full"
+    full.mkdir()
+    (full / "notes.txt").write_text("mine")
     places = {"DESIGN": small / "01_sinh.json", "FOLDER": small, "OUT": tmp_path / "out"}
+    places["FULL"] = full
     words = [str(places.get(word, word)) for word in line.split()]
     try:
         status = cli.main(words)
@@ -619,4 +624,4 @@ def test_messages_say_what_was_meant(line, message, repository, tmp_path, capsys
         status = end.code
     assert status == 2
     assert re.search(message, capsys.readouterr().err)
-    assert not (tmp_path / "out").exists()
+    assert not (tmp_path / "out").exists() and [p.name for p in full.iterdir()] == ["notes.txt"]

@@ -13,7 +13,7 @@ import tempfile
 import zlib
 from pathlib import Path
 
-from ..errors import InputError
+from ..errors import InputError, OccupiedError
 
 # Far more than any design, kit or result needs; keeps a hostile archive from filling the memory.
 SIZE_LIMIT = 512 * 2**20
@@ -100,7 +100,7 @@ def check_output_file(path: str | Path, *, overwrite: bool = False) -> None:
     if os.path.isdir(path):
         raise InputError("is a folder, expected a file to write", source=path)
     if os.path.exists(path) and not overwrite:
-        raise InputError("exists already", source=path)
+        raise OccupiedError("exists already", source=path)
     if not os.path.isdir(path.parent):
         raise InputError("can't be written: its folder doesn't exist", source=path)
 

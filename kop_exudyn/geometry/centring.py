@@ -21,6 +21,10 @@ NEAR = 2.0  # sizes: what lies as near to the origin as this stays where it is
 FARTHEST = 1e7  # sizes, where coordinates are rounded to 1e-9 of the size
 
 
+class TooFarError(InputError):
+    """A design lies further from the origin than `FARTHEST` of its sizes."""
+
+
 def middle_of(points: Any, field: str) -> np.ndarray:
     """The point (k,) around which to work on points (n, k): the middle of their bounding box, zero
     where that is near the origin.
@@ -40,7 +44,7 @@ def middle_of(points: Any, field: str) -> np.ndarray:
     if distance <= NEAR * size:
         return np.zeros(x.shape[1])
     if distance > FARTHEST * size:
-        raise InputError(
+        raise TooFarError(
             f"lies {distance / size:.2g} times its own size from the origin, where numbers of "
             f"double precision are too coarse for it (at most {FARTHEST:.0e}): move it nearer",
             field=field,

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..errors import InputError
+from ..errors import InputError, OccupiedError
 from ..files.arrays import load_arrays, save_arrays, sealed, unsealed
 from ..files.documents import check_envelope
 from ..files.files import is_temporary, make_folder, read_bytes
@@ -109,7 +109,7 @@ class CheckpointStore:
         if resume and record.exists():
             difference = Job.load(record).difference(job)
             if difference is not None:
-                raise InputError(
+                raise OccupiedError(
                     f"can't resume, the checkpoints belong to a different job: {difference}",
                     source=folder,
                 )

@@ -7,7 +7,7 @@ import logging
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import InputError
+from ..errors import OccupiedError
 from ..files.files import is_temporary, make_folder
 from .checkpoint import CheckpointStore, Job
 
@@ -59,16 +59,15 @@ def _check_free(path: Path, record: Path, job: Job) -> None:
     if not content:
         return
     if not record.exists():
-        raise InputError(
+        raise OccupiedError(
             "the folder isn't empty and wasn't written by an earlier run: choose another or allow "
             "overwriting",
             source=path,
         )
     difference = Job.load(record).difference(job, code=False)  # results may be renewed
     if difference is not None:
-        raise InputError(
+        raise OccupiedError(
             f"the folder holds the results of a different job ({difference}): choose another or "
-            f"allow "
-            "overwriting",
+            "allow overwriting",
             source=path,
         )

@@ -16,10 +16,10 @@ from ..files.arrays import numbers_of
 from ..kit.optimality import ClusteringGap
 from ..kit.parts import Assignment, Kit
 from ..scene.state import State
-from ..search.events import events_from_list
+from ..search.events import StageEvent, events_from_list
 from ..search.objective import DesignObjective, Evaluation, Reference, Weights, reference_of
 from ..search.result import INPUT, REDEPLOYED, STAGES, KitResult
-from ..search.stage_results import Jump, StageEvent, StageResult
+from ..search.stage_results import Jump, StageResult
 from ..structures.base import Design, Role
 from .results import load_result, load_states
 

@@ -18,11 +18,11 @@ from ..io.checkpoint import Job
 from ..io.run_folder import RunFolder
 from ..kit.parts import Kit
 from ..kit.stock import Stock
+from ..search.events import StageEvent
 from ..search.pool import DesignPool
 from ..search.result import KitResult
 from ..search.run import check_request, described_job, digest, optimize_kit
 from ..search.settings import JobSettings
-from ..search.stage_results import StageEvent
 from ..structures.base import Design
 from .kit_report import write_kit_report
 from .verdicts import give_verdicts, given_verdicts, warning_lines

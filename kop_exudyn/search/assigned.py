@@ -11,6 +11,7 @@ from itertools import count
 import numpy as np
 
 from ..errors import SimulationFailure
+from .events import ASSIGNED, SQPLabel
 from .objective import DesignDerivatives, Evaluation
 from .reassign import LocalModel, MoveParts, Reassignment, best_parts, keep_parts, reassign
 from .settings import StageSettings
@@ -61,8 +62,8 @@ def assigned_stage(
     """
     settings = stages.settings
     if settings.reassignments == 0:
-        name = "assigned" if numbers is None else f"assigned-{next(numbers)}"
-        return stages.assigned(start, name) if stages.rule.parts_move else start
+        label = ASSIGNED if numbers is None else SQPLabel.of_round(next(numbers))
+        return stages.assigned(start, label) if stages.rule.parts_move else start
     rounds = _Rounds(stages, numbers or count(1), start.steps)
     best = rounds.alternated(start, settings.reassignments)
     leaps = settings.leaps if leaps is None else leaps
@@ -151,7 +152,7 @@ def forgiving_stage(
     steps = best.steps
     for factor in _CALMER if stages.rule.parts_move else ():
         calmer = stages.calmer(factor)
-        trial = calmer.assigned(calmer.weighed(best), f"assigned-{next(numbers)}")
+        trial = calmer.assigned(calmer.weighed(best), SQPLabel.of_round(next(numbers)))
         steps += trial.steps
         if stages.required.opening:
             opened = stages.judged(replace(trial, designs=stages.redeployed(trial)))
@@ -179,7 +180,7 @@ def _secured(stages: Stages, best: StageResult, numbers: Iterator[int]) -> Stage
     best = secured.kept(best)
     if not stages.rule.parts_move or best.value is None:
         return best
-    found = secured.assigned(best, f"assigned-{next(numbers)}")
+    found = secured.assigned(best, SQPLabel.of_round(next(numbers)))
     opened = replace(found, designs=secured.redeployed(found))
     same = found.value is not None and _all_same(secured, found, opened)
     return replace(found, steps=best.steps + found.steps) if same else best
@@ -236,7 +237,7 @@ class _Rounds:
         settings = self.stages.settings
         result = self.stages.assigned(
             result,
-            f"assigned-{next(self.numbers)}",
+            SQPLabel.of_round(next(self.numbers)),
             max_steps or settings.round_steps,
             tolerance or settings.round_tolerance,
         )

@@ -17,14 +17,14 @@ from ..structures.deviation import fit_summary
 from ..structures.fitting import TargetFitting
 from ..structures.strength import strength_summary
 from ..units import Units, common_units
-from .events import events_to_list
+from .events import Stage, StageEvent, events_to_list
 from .objective import Evaluation, Reference
-from .stage_results import SAME_STATE, StageEvent, StageResult, distance
+from .stage_results import SAME_STATE, StageResult, distance
 from .starts import TriedStart
 
 INPUT = "input"  # the designs as given, before all stages
 REDEPLOYED = "redeployed"  # the assigned designs, opened from their assembly
-STAGES = ("direct", "unrelaxed", "published", "published_opened", "relaxed", "assigned")
+STAGES = tuple(stage.value for stage in Stage)
 
 
 @dataclass

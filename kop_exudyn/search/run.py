@@ -20,6 +20,7 @@ from ..structures.base import Design
 from ..units import common_units
 from .assigned import opened_stage
 from .dataset import Dataset
+from .events import UNRELAXED, Observer, StageEvent
 from .neighbours import resized
 from .objective import Evaluation, Weights
 from .pool import DesignPool
@@ -27,8 +28,8 @@ from .published import published_method
 from .requirements import Requirements
 from .result import KitResult
 from .settings import JobSettings
-from .stage_results import StageEvent, StageResult
-from .stages import NoStore, Observer, Stages, Store
+from .stage_results import StageResult
+from .stages import NoStore, Stages, Store
 from .starts import assigned_from_starts
 
 
@@ -101,7 +102,7 @@ def optimize_kit(
             found["direct"] = baselines.direct()
             if settings.baselines and kit is None:
                 announce("unrelaxed baseline")
-                found["unrelaxed"] = baselines.assigned(found["direct"], "unrelaxed")
+                found["unrelaxed"] = baselines.assigned(found["direct"], UNRELAXED)
             if settings.published and kit is None:
                 published = published_method(
                     dataset,

@@ -1,4 +1,4 @@
-"""What the stages of finding a kit leave: steps, snaps and results, and how results are compared
+"""What the stages of finding a kit leave: snaps and results, and how results are compared
 and put together."""
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import numpy as np
 
 from ..errors import SimulationFailure
 from ..kit.parts import Assignment, Kit
-from ..sqp.history import StepRecord
 from ..structures.base import Design
 from ..structures.opening import SAME_STATE  # noqa: F401
 from .dataset import Dataset
@@ -21,32 +20,6 @@ from .objective import Evaluation
 # snapped.
 _JUMP_FACTOR = 6.0
 _JUMP_SHARE = 0.01  # of the bounding box; smaller moves are no snap whatever their ratio
-
-
-@dataclass(frozen=True)
-class StageEvent:
-    """One accepted step, as observers see it: the SQP's name, the record, the objective's terms,
-    w_c (or None).
-
-    The SQP of round 2 of the assigned stage is "assigned-2".
-    """
-
-    sqp: str
-    record: StepRecord
-    terms: Mapping[str, float]
-    weight: float | None
-
-    @property
-    def stage(self) -> str:
-        """ "relaxed" with all its w_c and rescues, "assigned" with all its rounds, or
-        "unrelaxed"."""
-        return "relaxed" if self.weight is not None else self.sqp.partition("-")[0]
-
-    @property
-    def round(self) -> int | None:
-        """The round of the assigned stage, from 1; None elsewhere."""
-        number = self.sqp.partition("-")[2]
-        return int(number) if self.stage == "assigned" and number else None
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from typing import Any, Protocol
@@ -24,11 +24,12 @@ from ..sqp.history import SQPState
 from ..sqp.problem import Point
 from ..sqp.solver import SQPOptions, SQPResult, minimise
 from .dataset import Dataset, all_or_raise, evaluations_from_arrays, evaluations_to_arrays
+from .events import ASSIGNED, Observer, SQPLabel, Stage, StageEvent
 from .kit_rule import rule_of
 from .objective import Evaluation, Weights
 from .problems import AssignedProblem, RelaxedProblem
 from .settings import StageSettings
-from .stage_results import Jump, StageEvent, StageResult, find_jump, restrict
+from .stage_results import Jump, StageResult, find_jump, restrict
 
 log = logging.getLogger(__name__)
 
@@ -62,9 +63,6 @@ class PrefixedStore:
 
     def save(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
         self.store.save(self.prefix + name, arrays)
-
-
-Observer = Callable[[StageEvent], None]
 
 
 class Stages:
@@ -113,14 +111,13 @@ class Stages:
         self,
         kit: Kit,
         start: Sequence[Evaluation] | None = None,
-        name: str = "relaxed",
     ) -> StageResult:
         """Minimise over all elements, w_c raised until the clusters are tight; from the inputs or
         given evaluations."""
         settings, evaluations = self.settings, list(start or self.inputs())
         steps, q = 0, np.concatenate([e.q for e in evaluations])
         for weight in self.schedule:
-            result, problem = self._relax(f"{name}-{weight:g}", weight, q, evaluations, kit)
+            result, problem = self._relax(f"relaxed-{weight:g}", weight, q, evaluations, kit)
             q, evaluations, kit = result.x, result.point.data.evaluations, result.point.data.kit
             steps += result.steps
             if (
@@ -136,13 +133,14 @@ class Stages:
     def assigned(
         self,
         start: StageResult,
-        name: str = "assigned",
+        label: SQPLabel = ASSIGNED,
         max_steps: int | None = None,
         tolerance: float | None = None,
     ) -> StageResult:
         """Minimise over the parts from a state in which every element is its part; designs that
         failed stay out.
 
+        label : of the SQP; one of its own for every call
         max_steps, tolerance : default: the settings' `assigned_steps` and `assigned_tolerance`
         """
         members = [n for n, e in enumerate(start.designs) if isinstance(e, Evaluation)]
@@ -153,7 +151,7 @@ class Stages:
             check_feasible(problem.lower, problem.upper, problem.constraints)
         except InputError as error:
             log.warning(
-                "%s: the elements' constraints can't be met by these parts: %s", name, error
+                "%s: the elements' constraints can't be met by these parts: %s", label.name, error
             )
             return replace(start, status="the constraints can't be met by these parts", jumps=[])
         evaluations = [e for e in start.designs if isinstance(e, Evaluation)]
@@ -167,7 +165,7 @@ class Stages:
             decrease_tolerance=tolerance or self.settings.assigned_tolerance,
             penalty=self.dataset.penalty,
         )
-        result = self._sqp(name, problem, point, options, None)
+        result = self._sqp(label, problem, point, options)
         designs = list(start.designs)
         for n, evaluation in zip(members, result.point.data.evaluations):
             designs[n] = evaluation
@@ -408,15 +406,12 @@ class Stages:
             else settings.relaxed_tolerance,
             penalty=self.dataset.penalty,
         )
-        return self._sqp(
-            name, problem, problem.point(q, list(evaluations), kit), options, weight
-        ), problem
+        label = SQPLabel(name, Stage.RELAXED, weight=weight)
+        return self._sqp(label, problem, problem.point(q, list(evaluations), kit), options), problem
 
-    def _sqp(
-        self, name: str, problem: Any, start: Point, options: SQPOptions, weight: float | None
-    ) -> SQPResult:
+    def _sqp(self, label: SQPLabel, problem: Any, start: Point, options: SQPOptions) -> SQPResult:
         """Minimise, or go on from the store's checkpoint of that name."""
-        tally = problem.dataset.tally
+        name, tally = label.name, problem.dataset.tally
         before = (tally.equilibria, tally.newton_iterations)
         state, saved = None, self.store.load(name)
         terms: list[str] = []
@@ -433,11 +428,11 @@ class Stages:
             tally.equilibria += equilibria
             tally.newton_iterations += iterations
             for record, row in zip(state.history, rows):
-                self.observer(StageEvent(name, record, row, weight))
+                self.observer(StageEvent(label, record, row))
 
         def checkpoint(state: SQPState, point: Point) -> None:
             terms.append(json.dumps(point.data.terms))
-            self.observer(StageEvent(name, state.history[-1], point.data.terms, weight))
+            self.observer(StageEvent(label, state.history[-1], point.data.terms))
             self.store.save(
                 name,
                 {

@@ -20,6 +20,7 @@ from ..kit.cluster import cluster
 from ..kit.kinds import part_kind
 from ..kit.parts import Assignment, Kit
 from .assigned import assigned_stage
+from .events import SQPLabel
 from .exchange import exchanged
 from .objective import Evaluation
 from .problems import AssignedProblem
@@ -94,7 +95,7 @@ def assigned_from_starts(
         best,
         lambda result: stages.assigned(
             result,
-            f"assigned-{next(numbers)}",
+            SQPLabel.of_round(next(numbers)),
             settings.round_steps,
             settings.assigned_tolerance,
         ),

@@ -21,8 +21,8 @@ from kop_exudyn.equilibrium.sensitivities import Sensitivities
 from kop_exudyn.equilibrium.system import System
 from kop_exudyn.kit.projection import Projection
 from kop_exudyn.search import objective
+from kop_exudyn.search.events import StageEvent
 from kop_exudyn.search.objective import DesignObjective
-from kop_exudyn.search.stage_results import StageEvent
 from kop_exudyn.sqp.qp import QPSolver
 
 REST = "rest"

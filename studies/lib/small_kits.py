@@ -177,6 +177,6 @@ def _all_values(strip: Strip) -> list[float]:
             starts = [stages.built_from(kit, assignment, inputs, path_steps=3) for kit in kits]
             whole = [start for start in starts if start.value is not None]
             built = min(whole, key=lambda start: start.value) if whole else None
-            value = stages.assigned(built, "each").value if built is not None else None
+            value = stages.assigned(built).value if built is not None else None
             found.append(float("inf") if value is None else value)
     return found

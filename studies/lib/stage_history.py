@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from kop_exudyn.drawing.style import CYCLE, style
 from kop_exudyn.report.designs import DrawnState
 from kop_exudyn.report.kit_drawings import drawn_state
+from kop_exudyn.search.events import StageEvent
 from kop_exudyn.search.objective import DesignObjective
 from kop_exudyn.search.result import KitResult
-from kop_exudyn.search.stage_results import StageEvent
 
 
 @dataclass(frozen=True)

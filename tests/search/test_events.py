@@ -6,12 +6,17 @@ import numpy as np
 import pytest
 
 from kop_exudyn.errors import InputError
-from kop_exudyn.search.events import events_from_list, events_to_list
-from kop_exudyn.search.stage_results import StageEvent
+from kop_exudyn.search.events import (
+    SQPLabel,
+    Stage,
+    StageEvent,
+    events_from_list,
+    events_to_list,
+)
 from kop_exudyn.sqp.history import StepRecord
 
 
-def event(sqp: str, step: int, weight: float | None, terms: dict[str, float]) -> StageEvent:
+def event(label: SQPLabel, step: int, terms: dict[str, float]) -> StageEvent:
     record = StepRecord(
         step,
         1 / step,
@@ -28,14 +33,15 @@ def event(sqp: str, step: int, weight: float | None, terms: dict[str, float]) ->
         "piqp",
         {"qp": 0.1, "evaluate": 0.2},
     )
-    return StageEvent(sqp, record, terms, weight)
+    return StageEvent(label, record, terms)
 
 
+RELAXED = SQPLabel("relaxed-10", Stage.RELAXED, weight=10.0)
 EVENTS = [
-    event("relaxed-10", 1, 10.0, {"fit": 1.0, "projection": 2.0}),
-    event("relaxed-10", 2, 10.0, {"fit": 0.5}),
-    event("assigned-1", 1, None, {"fit": 0.4}),
-    event("assigned-2", 1, None, {"fit": 0.3}),
+    event(RELAXED, 1, {"fit": 1.0, "projection": 2.0}),
+    event(RELAXED, 2, {"fit": 0.5}),
+    event(SQPLabel.of_round(1), 1, {"fit": 0.4}),
+    event(SQPLabel.of_round(2), 1, {"fit": 0.3}),
 ]
 
 
@@ -47,6 +53,31 @@ def test_round_trip_through_json():
         "projection": [2.0, None],
     }
     assert events_from_list(data) == EVENTS
+
+
+def test_stage_and_round_are_fields():
+    named = SQPLabel("any name-7", Stage.ASSIGNED, 3)
+    (entry,) = events_to_list([event(named, 1, {"fit": 1.0})])
+    assert (entry["stage"], entry["round"], entry["weight"]) == ("assigned", 3, None)
+    (back,) = events_from_list([entry])
+    assert (back.sqp, back.stage, back.round) == ("any name-7", Stage.ASSIGNED, 3)
+
+
+@pytest.mark.parametrize(
+    ("name", "weight", "stage", "number"),
+    [
+        ("relaxed-0.1", 0.1, Stage.RELAXED, None),
+        ("rescue-1", 1e3, Stage.RELAXED, None),
+        ("assigned", None, Stage.ASSIGNED, None),
+        ("assigned-12", None, Stage.ASSIGNED, 12),
+        ("unrelaxed", None, Stage.UNRELAXED, None),
+    ],
+)
+def test_files_of_earlier_versions_have_them_in_the_name(name, weight, stage, number):
+    (entry,) = events_to_list([event(SQPLabel(name, Stage.RELAXED, None, weight), 1, {})])
+    del entry["stage"], entry["round"]
+    (back,) = events_from_list([entry])
+    assert back.label == SQPLabel(name, stage, number, weight)
 
 
 def test_what_is_not_finite_comes_back():
@@ -63,6 +94,8 @@ def test_what_is_not_finite_comes_back():
         lambda e: e.update(value=[1.0]),
         lambda e: e.update(terms=3),
         lambda e: e.update(step=None),
+        lambda e: e.update(stage="somewhere"),
+        lambda e: [e.pop(name) for name in ("stage", "round")] + [e.update(sqp="x", weight=None)],
     ],
 )
 def test_something_else_is_refused(change):

@@ -33,7 +33,7 @@ def found(repository):
         stages = Stages(dataset, {"linear": 2, "angular": 1}, SETTINGS)
         start = stages.secured().kept(stages.direct())
         careless = stages.secured().assigned(start)
-        careful = stages.secured(forgiving=True).assigned(start, "careful")
+        careful = stages.secured(forgiving=True).assigned(start)
         won = forgiving_stage(stages, careless, (), count(1), start)
         told = [stages.snapping(result) for result in (start, careless, careful, won)]
         lost = forgiving_stage(replace_rule(stages), careless, (), count(1))

@@ -15,9 +15,9 @@ from support.placements import placed
 from kop_exudyn.analysis.simulation import simulate
 from kop_exudyn.equilibrium.newton import refine, solve
 from kop_exudyn.equilibrium.system import System
-from kop_exudyn.errors import InputError
 from kop_exudyn.exchange.polygons import write_mesh_obj
 from kop_exudyn.exchange.states import states_of_simulation
+from kop_exudyn.geometry.centring import TooFarError
 from kop_exudyn.geometry.extent import size_of_points
 from kop_exudyn.geometry.surfaces import PLAN_AXES
 from kop_exudyn.io.designs import load_design
@@ -105,7 +105,11 @@ def target(request, repository):
 @settings(max_examples=5, deadline=None, derandomize=True)
 @given(st.integers(0, 2**32 - 1))
 def test_fits_to_a_turned_target_are_the_same(target, seed):
-    """Of joints scattered about it: the surface, the places and the joints turned alike."""
+    """Of joints scattered about it: the surface, the places and the joints turned alike.
+
+    Fits end with steps of 1e-10 of the size, and converge linearly where residuals are large:
+    4e-8 % is seen between the two.
+    """
     rng = np.random.default_rng(seed)
     motion = Placement(Rotation.random(rng=rng).as_matrix(), 10 * target.size * rng.normal(size=3))
     vertices, joints = motion.apply(target.vertices), motion.apply(target.positions)
@@ -115,8 +119,8 @@ def test_fits_to_a_turned_target_are_the_same(target, seed):
     here = replace(target, size=size_of_points(target.vertices[np.unique(target.faces)]))
     x = target.positions + 0.01 * target.size * rng.normal(size=target.positions.shape)
     found = [TargetFitting(t)(y) for t, y in ((here, x), (there, motion.apply(x)))]
-    assert found[1].max_percent == pytest.approx(found[0].max_percent, abs=1e-9)
-    assert found[1].mean_percent == pytest.approx(found[0].mean_percent, abs=1e-9)
+    assert found[1].max_percent == pytest.approx(found[0].max_percent, abs=1e-6)
+    assert found[1].mean_percent == pytest.approx(found[0].mean_percent, abs=1e-6)
 
 
 def test_kits_of_turned_designs_are_the_same(repository):
@@ -211,7 +215,7 @@ def test_simulations_and_files_have_the_users_coordinates(repository):
 def test_what_double_precision_cannot_tell_is_refused(repository, name):
     data = json.loads((repository / "models" / name).read_text())
     moved, _, _ = placed(data, 2e8, 0)
-    with pytest.raises(InputError, match="times its own size from the origin"):
+    with pytest.raises(TooFarError, match="times its own size from the origin"):
         design_from_dict(moved, "far.json")
 
 

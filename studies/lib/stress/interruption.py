@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from kop_exudyn.errors import SimulationFailure
+from kop_exudyn.search.events import StageEvent
 from kop_exudyn.search.result import KitResult
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings
-from kop_exudyn.search.stage_results import StageEvent
 from kop_exudyn.structures.base import Design
 
 

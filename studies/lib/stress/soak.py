@@ -19,7 +19,7 @@ from kop_exudyn.cli import main
 from kop_exudyn.equilibrium.equilibria import Equilibrium, Start
 from kop_exudyn.equilibrium.newton import refine, solve
 from kop_exudyn.errors import InputError, SimulationFailure
-from kop_exudyn.geometry.centring import FARTHEST
+from kop_exudyn.geometry.centring import FARTHEST, TooFarError
 from kop_exudyn.structures.base import Design, design_from_dict
 from kop_exudyn.structures.fitting import FitResult, TargetFitting, best_placement
 
@@ -85,7 +85,7 @@ def compared(
     try:
         there = _read(data, place, folder / "there")
     except InputError as error:
-        if sizes > 0.5 * FARTHEST and "size from the origin" in str(error):
+        if sizes > 0.5 * FARTHEST and isinstance(error, TooFarError):
             return {"outcome": "refused as too far away", "wrong": ""}
         return {"outcome": "refused", "wrong": f"refused there: {error}"}
     if sizes > 10 * FARTHEST:
