@@ -7,6 +7,7 @@ from pathlib import Path
 
 FOLDERS = (
     "errors",
+    "checks",
     "plugins",
     "provenance",
     "units",

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import check_not_negative, check_positive, check_whole
 from ..equilibrium.equilibria import Equilibrium
 from ..equilibrium.stability import softest_mode
 from ..equilibrium.system import System
@@ -50,14 +51,12 @@ class VerdictSettings:
     safety: float = 1.0
 
     def __post_init__(self) -> None:
-        for name, positive in (("length", False), ("angle", False), ("safety", True)):
-            value = getattr(self, name)
-            if value is not None and not (np.isfinite(value) and value >= 0 and value > -positive):
-                raise InputError("must not be negative", field=f"tolerance.{name}", value=value)
-        if not self.safety > 0:
-            raise InputError("must be positive", field="tolerance.safety", value=self.safety)
-        if self.samples < 0:
-            raise InputError("must not be negative", field="tolerance.samples", value=self.samples)
+        for name in ("length", "angle"):
+            if getattr(self, name) is not None:
+                check_not_negative(f"tolerance.{name}", getattr(self, name))
+        check_positive("tolerance.safety", self.safety)
+        check_whole("tolerance.samples", self.samples)
+        check_whole("tolerance.seed", self.seed)
 
     def tolerance(self, design: Design) -> Tolerance:
         """That of a design's parts."""

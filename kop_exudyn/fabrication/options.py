@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks import check_not_negative, check_positive
 from ..errors import InputError
 from ..units import LENGTHS
 
@@ -31,10 +32,7 @@ class Tolerances:
 
     def __post_init__(self) -> None:
         for name in ("length", "angle"):
-            if not 0 < getattr(self, name) < np.inf:
-                raise InputError(
-                    "must be positive", field=f"tolerance.{name}", value=getattr(self, name)
-                )
+            check_positive(f"tolerance.{name}", getattr(self, name))
 
 
 @dataclass(frozen=True)
@@ -64,10 +62,7 @@ class CutOptions:
 
     def __post_init__(self) -> None:
         for name in ("gap", "margin", "kerf", "joint_hole", "bolt_hole", "clearance"):
-            if not 0 <= getattr(self, name) < np.inf:
-                raise InputError(
-                    "must not be negative", field=f"options.{name}", value=getattr(self, name)
-                )
+            check_not_negative(f"options.{name}", getattr(self, name))
         if not all(0 < side < np.inf for side in self.sheet):
             raise InputError(
                 "a sheet has a positive width and height", field="options.sheet", value=self.sheet

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import check_positive
 from ..errors import InputError
 
 _LARGEST = 1e60  # its fourth power is still a number
@@ -36,7 +37,7 @@ class Material:
     elastic_limit: float | None = None
 
     def __post_init__(self) -> None:
-        _positive("material.young", self.young)
+        check_positive("material.young", self.young, below=_LARGEST)
         if not -1 < self.poisson <= 0.5:
             raise InputError(
                 "Poisson's ratio must lie in (-1, 0.5]",
@@ -45,7 +46,7 @@ class Material:
             )
         for name in ("density", "elastic_limit"):
             if getattr(self, name) is not None:
-                _positive(f"material.{name}", getattr(self, name))
+                check_positive(f"material.{name}", getattr(self, name), below=_LARGEST)
 
     @property
     def shear_modulus(self) -> float:
@@ -102,8 +103,8 @@ def rectangle(width: float, height: float) -> Section:
     109), with the shorter side b and the longer a:  J = a b^3 / 3 (1 - 192 b / (pi^5 a) sum_odd
     tanh(n pi a / 2 b) / n^5).
     """
-    _positive("section.width", width)
-    _positive("section.height", height)
+    check_positive("section.width", width, below=_LARGEST)
+    check_positive("section.height", height, below=_LARGEST)
     b, a = sorted((width, height))
     n = _TORSION_TERMS
     ratio = n * np.pi * a / (2 * b)
@@ -136,7 +137,7 @@ def half_lapped(section: Section) -> Section:
 def drilled(section: Section, diameter: float) -> Section:
     """A rectangle with a hole along z through its joints. Raises InputError for a hole as wide as
     the section."""
-    _positive("section.joint_hole", diameter)
+    check_positive("section.joint_hole", diameter, below=_LARGEST)
     width, height = (float(side) for side in np.ptp(section.outline, axis=0))
     if diameter >= width:
         raise InputError(
@@ -174,7 +175,7 @@ def thickened(section: Section, share: float) -> Section:
     Torsion of other sections than rectangles is taken to grow as that of thin strips.
     Raises InputError for a share that is not positive.
     """
-    _positive("share", share)
+    check_positive("share", share, below=_LARGEST)
     extents = np.ptp(section.outline, axis=0)
     if np.isclose(*extents):
         scales = np.array([share, share])
@@ -202,7 +203,7 @@ def thickened(section: Section, share: float) -> Section:
 
 def circle(radius: float) -> Section:
     """Solid circle. Shear factor 9/10, the classical energy value of a circle."""
-    _positive("section.radius", radius)
+    check_positive("section.radius", radius, below=_LARGEST)
     turns = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     quarter = np.pi * radius**4 / 4
     return Section(
@@ -237,7 +238,7 @@ def general(
         ("shear_y", shear_y),
         ("shear_z", shear_z),
     ):
-        _positive(f"section.{name}", value)
+        check_positive(f"section.{name}", value, below=_LARGEST)
     if outline is None:
         y, z = np.sqrt(3 * inertia_z / area), np.sqrt(3 * inertia_y / area)
         outline = np.array([[y, z], [-y, z], [-y, -z], [y, -z]])
@@ -257,7 +258,7 @@ def general(
             value=outline,
         )
     if torsion_modulus is not None:
-        _positive("section.torsion_modulus", torsion_modulus)
+        check_positive("section.torsion_modulus", torsion_modulus, below=_LARGEST)
     else:
         torsion_modulus = float(np.min(np.ptp(outline, axis=0)))  # as of a thin strip
     return Section(area, inertia_y, inertia_z, torsion, shear_y, shear_z, outline, torsion_modulus)
@@ -306,12 +307,3 @@ def material_from_dict(data: Mapping[str, Any]) -> Material:
         raise InputError(
             f"wrong fields for a material: {error}", field="material", value=data
         ) from None
-
-
-def _positive(field: str, value: float) -> None:
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, (int, float, np.floating, np.integer))
-        or not 0 < value < _LARGEST
-    ):
-        raise InputError("must be a positive number", field=field, value=value)

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from ..errors import InputError
+from ..checks import check_flag, check_not_negative, check_positive, check_whole
 
 
 @dataclass(frozen=True)
@@ -42,21 +40,13 @@ class Requirements:
 
     def __post_init__(self) -> None:
         for name in ("opening", "stress", "loads"):
-            if not isinstance(getattr(self, name), bool):
-                raise InputError("must be true or false", field=name, value=getattr(self, name))
-        if not isinstance(self.samples, int) or isinstance(self.samples, bool) or self.samples < 0:
-            raise InputError(
-                "must be a whole number, not negative", field="samples", value=self.samples
-            )
+            check_flag(name, getattr(self, name))
+        check_whole("samples", self.samples)
         for name in ("length", "angle"):
-            value = getattr(self, name)
-            if value is not None and not (np.isfinite(value) and value >= 0):
-                raise InputError("must not be negative", field=name, value=value)
+            if getattr(self, name) is not None:
+                check_not_negative(name, getattr(self, name))
         for name in ("safety", "margin", "penalty"):
-            value = getattr(self, name)
-            number = isinstance(value, (int, float)) and not isinstance(value, bool)
-            if not (number and np.isfinite(value) and value > 0):
-                raise InputError("must be a positive number", field=name, value=value)
+            check_positive(name, getattr(self, name))
 
     @classmethod
     def none(cls) -> Requirements:

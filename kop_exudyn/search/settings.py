@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..checks import check_choice, check_flag, check_not_negative, check_positive, check_whole
 from ..errors import InputError
-from ..kit.kinds import Bounds
+from ..kit.kinds import Bounds, kind_names, part_kind
 from ..sqp.constraints import LinearConstraints
 from .objective import Weights
 from .requirements import Requirements
@@ -35,6 +37,19 @@ EFFORTS = {
     "normal": Effort(3, 5, 2, 2),
     "thorough": Effort(8, 10, 8, 8, 24),
 }
+
+
+# as the schema of study files has it
+_POSITIVE = (
+    "tight",
+    "relaxed_tolerance",
+    "last_tolerance",
+    "round_tolerance",
+    "assigned_tolerance",
+    "reassigned_tolerance",
+)
+_COUNTS = ("relaxed_steps", "assigned_steps", "round_steps", "path_steps", "restarts")
+_FROM_ZERO = ("reassignments", "leaps", "redeployments", "rescues", "growth", "seed")
 
 
 @dataclass(frozen=True)
@@ -72,6 +87,8 @@ class StageSettings:
     effort : "quick", "normal" or "thorough": from how many starts the assigned stage runs, see
         starts.py
     requirements : that the kit's designs have to meet, see there; not those of the baselines
+
+    Raises InputError, with the field and its value.
     """
 
     schedule: tuple[float, ...] | None = None
@@ -100,12 +117,29 @@ class StageSettings:
     requirements: Requirements = Requirements()
 
     def __post_init__(self) -> None:
-        if not 0 <= self.reuse < float("inf"):
-            raise InputError("expected a number from 0 on", field="reuse", value=self.reuse)
-        if self.effort not in EFFORTS:
-            raise InputError(
-                f"unknown (known: {', '.join(EFFORTS)})", field="effort", value=self.effort
-            )
+        if self.schedule is not None:
+            if not isinstance(self.schedule, Sequence) or not self.schedule:
+                raise InputError(
+                    "must be one number or more", field="schedule", value=self.schedule
+                )
+            for n, weight in enumerate(self.schedule):
+                check_positive(f"schedule[{n}]", weight)
+        for name in _POSITIVE:
+            check_positive(name, getattr(self, name))
+        for name in _COUNTS:
+            check_whole(name, getattr(self, name), least=1)
+        for name in _FROM_ZERO:
+            check_whole(name, getattr(self, name))
+        check_choice("hessian", self.hessian, ("exact", "bfgs"))
+        check_choice("effort", self.effort, tuple(EFFORTS))
+        check_not_negative("reuse", self.reuse)
+        for kind in self.bounds or {}:
+            check_choice("bounds", kind, kind_names())
+            part_kind(kind).bounds(self.bounds)
+        for name, expected in (("constraints", LinearConstraints), ("requirements", Requirements)):
+            value = getattr(self, name)
+            if not isinstance(value, expected) and not (value is None and name == "constraints"):
+                raise InputError(f"must be {expected.__name__}", field=name, value=value)
 
 
 @dataclass(frozen=True)
@@ -119,6 +153,8 @@ class JobSettings:
     jobs : processes
     baselines : also compute the unrelaxed baseline
     published : also find a kit by the published method, see published.py
+
+    Raises InputError, with the field and its value.
     """
 
     weights: Weights | None = None
@@ -127,3 +163,11 @@ class JobSettings:
     jobs: int = 2
     baselines: bool = True
     published: bool = False
+
+    def __post_init__(self) -> None:
+        given = () if self.design_weights is None else self.design_weights
+        for n, weight in enumerate(given):
+            check_positive(f"design_weights[{n}]", weight)
+        check_whole("jobs", self.jobs, least=1)
+        check_flag("baselines", self.baselines)
+        check_flag("published", self.published)

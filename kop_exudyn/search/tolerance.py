@@ -13,8 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks import check_not_negative
 from ..equilibrium.sensitivities import Sensitivities
-from ..errors import InputError, SimulationFailure
+from ..errors import SimulationFailure
 from ..kit.kinds import part_kind
 from ..structures.base import Design
 from ..structures.fitting import best_placement
@@ -42,10 +43,7 @@ class Tolerance:
 
     def __post_init__(self) -> None:
         for name in ("length", "angle"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
-                raise InputError(
-                    "must be a number that is not negative", field=name, value=getattr(self, name)
-                )
+            check_not_negative(name, getattr(self, name))
 
     def scaled(self, factor: float) -> Tolerance:
         return Tolerance(factor * self.length, factor * self.angle)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from ..checks import check_choice, check_not_negative, check_positive, check_whole
 from ..errors import InputError, SimulationFailure
 from .constraints import check_feasible, validate_bounds
 from .curvature import SecantCorrection
@@ -77,12 +78,11 @@ class SQPOptions:
     qp: QPOptions = QPOptions()
 
     def __post_init__(self) -> None:
-        if self.hessian not in ("exact", "bfgs"):
-            raise InputError("must be 'exact' or 'bfgs'", field="hessian", value=self.hessian)
-        if not self.max_steps >= 0:
-            raise InputError("must not be negative", field="max_steps", value=self.max_steps)
+        check_choice("hessian", self.hessian, ("exact", "bfgs"))
+        for name in ("max_steps", "max_trials", "stall_steps", "raises"):
+            check_whole(name, getattr(self, name), least=name in ("max_trials", "stall_steps"))
+        check_not_negative("feasibility", self.feasibility)
         for name in (
-            "max_trials",
             "gradient_tolerance",
             "decrease_tolerance",
             "radius",
@@ -91,8 +91,7 @@ class SQPOptions:
             "penalty",
             "excess",
         ):
-            if not getattr(self, name) > 0:
-                raise InputError("must be positive", field=name, value=getattr(self, name))
+            check_positive(name, getattr(self, name), finite=name != "radius")
 
 
 @dataclass(frozen=True)

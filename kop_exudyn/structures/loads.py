@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import check_positive
 from ..errors import InputError
 
 _STRAIGHT = 1e-3  # points within this share of their extent from a line don't hold a structure
@@ -40,10 +41,8 @@ class DeflectionLimit:
     def __post_init__(self) -> None:
         for name in ("absolute", "span_over"):
             value = getattr(self, name)
-            if value is not None and not (np.isfinite(value) and value > 0):
-                raise InputError(
-                    "must be a positive number", field=f"deflection.{name}", value=value
-                )
+            if value is not None:
+                check_positive(f"deflection.{name}", value)
 
     def allowed(self, span: float) -> float:
         """The largest deflection, for a span; inf where nothing limits it."""

@@ -27,5 +27,5 @@ def test_results_tell_how_many_pieces_have_to_be_made():
 
 
 def test_negative_weights_are_refused():
-    with pytest.raises(InputError, match="reuse = -1.0: expected a number from 0 on"):
+    with pytest.raises(InputError, match="reuse = -1.0: must be a number that is not negative"):
         StageSettings(reuse=-1.0)
