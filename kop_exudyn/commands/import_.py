@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ..exchange.drawing import Finding
     from ..exchange.drawn_networks import DrawnNetwork, ReadingOptions
     from ..exchange.imports import Imported
+    from ..structures.base import Design
     from ..units import Units
 
 HELP = "turn a drawing, a surface or a released umbrella mesh into a design file"
@@ -204,17 +205,17 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from ..errors import InputError
-    from ..exchange.curve_files import CURVE_READERS
+    from ..exchange.curve_files import CURVE_READERS, is_drawing
     from ..files.files import check_output_file
 
     if args.out is None and args.preview is None:
         raise InputError("nothing to do: give --out, --preview or both", source=args.file)
     for path in filter(None, (args.out, args.preview)):
         check_output_file(path, overwrite=args.overwrite)
-    drawn = args.file.suffix.lower() in CURVE_READERS
-    wanted = args.kind or ("c_shell" if drawn and args.patch is None else "umbrella")
-    if wanted == "umbrella":
-        return _umbrella(args)
+    drawn = is_drawing(args.file)
+    wanted = args.kind or ("c_shell" if drawn and args.patch is None else None)
+    if wanted in (None, "umbrella"):
+        return _undrawn(args)
     if not drawn:
         raise InputError(
             f"can't be made of this file: expected {' or '.join(CURVE_READERS)}",
@@ -376,69 +377,83 @@ def _material(args: argparse.Namespace) -> dict[str, float]:
     return {name: value for name, value in given.items() if value is not None}
 
 
-def _umbrella(args: argparse.Namespace) -> int:
+def _undrawn(args: argparse.Namespace) -> int:
+    """An umbrella mesh on a surface, or a design of another program's file."""
     from ..errors import InputError
     from ..files.json_files import write_json
     from ..structures.base import design_from_dict
 
-    data = _umbrella_data(args)
+    data = _undrawn_data(args)
     try:
         design = design_from_dict(data, str(args.out or args.file))
     except InputError as error:
         raise InputError(
             error.message, source=args.file, field=error.field, value=error.value
         ) from None
+    if args.preview is not None and design.class_name != "umbrella":
+        raise InputError("shows drawings and umbrella meshes only", field="--preview")
     if args.out is not None:
         write_json(args.out, data, overwrite=args.overwrite)
-    lengths = design.parameters
-    figures = {
-        "cells": len(data["lengths"]),
-        "joints": len(design.joints),
-        "shortest_arm": float(lengths.min()),
-        "longest_arm": float(lengths.max()),
-        "units": data["units"],
-    }
-    unit = data["units"]["length"]
-    rows = [
-        ("cells", str(figures["cells"])),
-        ("joints", f"{figures['joints']} X joints"),
-        ("arms", f"{lengths.min():.4g} to {lengths.max():.4g} {unit}"),
-        ("units", f"{unit}, {data['units']['force']}"),
-    ]
-    if "target" not in data:
-        rows.append(("look at", "no target surface: the deployed design itself is taken as one"))
+    figures, rows = _figures(design, data)
     if args.preview is not None:
         from ..report.import_preview import umbrella_preview
 
         page = umbrella_preview(args.file.name, data, rows)
         page.save(args.preview, overwrite=args.overwrite)
-    told = {"design": args.out, "preview": args.preview, "class": "umbrella", "name": data["name"]}
-    _report(args, told | {"summary": figures}, rows)
+    told = {"design": args.out, "preview": args.preview, "class": data["class"]}
+    _report(args, told | {"name": data["name"], "summary": figures}, rows)
     return 0
 
 
-def _umbrella_data(args: argparse.Namespace) -> dict[str, Any]:
-    """The content of an umbrella mesh's design file."""
+def _figures(design: Design, data: dict[str, Any]) -> tuple[dict[str, Any], list[tuple[str, str]]]:
+    """What is told of a design that wasn't drawn: as plain data, and in words."""
+    units = data.get("units")
+    figures: dict[str, Any] = {"joints": len(design.joints), "units": units}
+    if design.class_name != "umbrella":
+        figures["elements"] = design.n_elements
+        rows = [("elements", str(design.n_elements)), ("joints", str(len(design.joints)))]
+    else:
+        lengths = design.parameters
+        figures["cells"] = len(data["lengths"])
+        figures |= {"shortest_arm": float(lengths.min()), "longest_arm": float(lengths.max())}
+        arms = f"{lengths.min():.4g} to {lengths.max():.4g} {data['units']['length']}"
+        rows = [
+            ("cells", str(figures["cells"])),
+            ("joints", f"{figures['joints']} X joints"),
+            ("arms", arms),
+        ]
+    if units is not None:
+        rows.append(("units", f"{units['length']}, {units['force']}"))
+    if "target" not in data:
+        rows.append(("look at", "no target surface: the deployed design itself is taken as one"))
+    return figures, rows
+
+
+def _undrawn_data(args: argparse.Namespace) -> dict[str, Any]:
+    """The content of the design file, of a surface or of a file of another program."""
     from ..errors import InputError
-    from ..files.json_files import read_json
-    from ..structures.umbrella.importer import import_release
-    from ..structures.umbrella.release import is_release
+    from ..files.documents import is_own
+    from ..files.json_files import is_json_file, json_stem, read_json
+    from ..structures.base import foreign_format, format_names
 
     if args.patch is not None:
         return _umbrella_on_mesh(args)
-    if args.file.suffix.lower() not in (".json", ".gz"):
+    if not is_json_file(args.file):
         raise InputError("an umbrella mesh on a surface needs --patch", source=args.file)
     data = read_json(args.file)
-    if isinstance(data, dict) and str(data.get("format", "")).startswith("kop_exudyn/"):
+    if is_own(data):
         raise InputError(
             "is a file of kop_exudyn already: use it as it is", source=args.file, field="format"
         )
-    if not is_release(data):
+    foreign = foreign_format(data)
+    if foreign is None or foreign.rewrite is None:
         raise InputError(
-            "isn't a released umbrella mesh; of a surface, give --patch", source=args.file
+            f"isn't a {' or a '.join(format_names())}; of a surface, give --patch", source=args.file
         )
-    name = args.file.name.removesuffix(".gz").removesuffix(".json")
-    return import_release(data, name, str(args.file), args.plates)
+    own = foreign.rewrite(data, json_stem(args.file), str(args.file))
+    if own["class"] == "umbrella" and args.plates == "rigid":
+        own["plate_model"] = args.plates
+    return own
 
 
 def _umbrella_on_mesh(args: argparse.Namespace) -> dict[str, Any]:

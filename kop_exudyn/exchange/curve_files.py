@@ -15,6 +15,11 @@ _SIZE_LIMIT = 64 * 2**20  # bytes: nets have some thousand points
 _MOST_CURVES = 20_000
 
 
+def is_drawing(path: Path) -> bool:
+    """Whether a file's name is that of a drawing that can be read."""
+    return path.suffix.lower() in CURVE_READERS
+
+
 def read_drawing(path: str | Path, layers: Sequence[str] = ()) -> Drawing:
     """All curves of an OBJ or DXF file, told apart by the name's ending.
 

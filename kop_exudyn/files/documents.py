@@ -15,6 +15,7 @@ from ..errors import InputError
 _LONGEST = 160  # characters of a message that quotes what it found
 # Of numbers, whose powers stay within double precision, and of whole numbers.
 LARGEST, SMALLEST, LARGEST_WHOLE = 1e60, 1e-60, 2**53
+_OURS = "kop_exudyn/"  # begins the names of our formats
 _PREFIX = "urn:kop_exudyn:"
 _TYPES = {
     "object": "an object",
@@ -27,10 +28,15 @@ _TYPES = {
 }
 
 
+def is_own(data: Any) -> bool:
+    """Whether a file's content says that it is of one of our own formats."""
+    return isinstance(data, Mapping) and str(data.get("format", "")).startswith(_OURS)
+
+
 def check_envelope(data: Any, name: str, version: int, source: Any = None) -> None:
     """Raise InputError unless the data is an object {"format": "kop_exudyn/NAME", "version": ...}
     that we can read."""
-    format_name = f"kop_exudyn/{name}"
+    format_name = f"{_OURS}{name}"
     if not isinstance(data, Mapping):
         raise InputError(f"expected an object of the format {format_name!r}", source=source)
     if data.get("format") != format_name:

@@ -27,6 +27,20 @@ _HALF = re.compile(r"\\u[dD][89a-fA-F]")
 _LINE_END = re.compile(r"\n\s+")
 
 
+JSON_ENDINGS = (".json", ".json.gz")  # of the names of files that `read_json` reads
+
+
+def is_json_file(path: str | Path) -> bool:
+    """Whether a file's name is that of a JSON file, perhaps gzipped."""
+    return str(path).lower().endswith(JSON_ENDINGS)
+
+
+def json_stem(path: Path) -> str:
+    """The name of a JSON file without its ending."""
+    ending = next((end for end in JSON_ENDINGS[::-1] if path.name.lower().endswith(end)), "")
+    return path.name[: len(path.name) - len(ending)]
+
+
 def read_json(path: str | Path) -> Any:
     """The content of a JSON file, which may be gzipped.
 

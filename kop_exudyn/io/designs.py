@@ -11,12 +11,11 @@ from pathlib import Path
 from ..errors import InputError
 from ..files.documents import check_envelope, check_range, check_schema, has_schema
 from ..files.files import reason_of
-from ..files.json_files import read_json
-from ..structures.base import Design, design_from_dict, foreign_reader
+from ..files.json_files import JSON_ENDINGS, read_json
+from ..structures.base import Design, design_from_dict, foreign_format
 from ..units import common_units
 
 DESIGN_VERSION = 2
-_SUFFIXES = (".json", ".json.gz")
 
 
 def load_design(path: str | Path) -> Design:
@@ -26,9 +25,9 @@ def load_design(path: str | Path) -> Design:
     """
     data = read_json(path)
     check_range(data, source=path)
-    if (read := foreign_reader(data)) is not None:
+    if (foreign := foreign_format(data)) is not None:
         try:
-            return read(data, str(path))
+            return foreign.read(data, str(path))
         except InputError as error:
             raise error.at(path) from None
     check_envelope(data, "design", DESIGN_VERSION, source=path)
@@ -74,7 +73,7 @@ def design_files(folder: str | Path) -> list[Path]:
     except OSError as error:
         raise InputError(f"can't be read: {reason_of(error)}", source=folder) from None
     found = [
-        folder / name for name in names if name.endswith(_SUFFIXES) and not name.startswith(".")
+        folder / name for name in names if name.endswith(JSON_ENDINGS) and not name.startswith(".")
     ]
     if not found:
         raise InputError("contains no designs (files that end in .json or .json.gz)", source=folder)

@@ -232,32 +232,45 @@ class ForeignFormat:
 
     recognises : whether a file's content is of this format, perhaps damaged
     read : makes the design of the content and the file's name
+    rewrite : makes the content of a design file of our own, of the content, the design's name and
+        the file's name; None: there is no such file
     """
 
     recognises: Callable[[Any], bool]
     read: Reader
+    rewrite: Callable[[Mapping[str, Any], str, str], dict[str, Any]] | None = None
 
 
 FORMATS: Registry[ForeignFormat] = Registry(__package__, "formats")
 
 
-def register_format(name: str, recognises: Callable[[Any], bool], read: Reader) -> None:
-    """Make `load_design` know files of another program.
+def register_format(
+    name: str,
+    recognises: Callable[[Any], bool],
+    read: Reader,
+    rewrite: Callable[[Mapping[str, Any], str, str], dict[str, Any]] | None = None,
+) -> None:
+    """Make `load_design` and ``kop import`` know files of another program.
 
-    name : of the format
-    recognises, read : see `ForeignFormat`
+    name : of the format, as messages call such a file
+    recognises, read, rewrite : see `ForeignFormat`
     """
-    FORMATS.add(name, ForeignFormat(recognises, read))
+    FORMATS.add(name, ForeignFormat(recognises, read, rewrite))
 
 
-def foreign_reader(data: Any) -> Reader | None:
-    """What reads a file's content that isn't in our own format; None where it is, or is nothing
-    that is known."""
+def foreign_format(data: Any) -> ForeignFormat | None:
+    """The format of a file's content that isn't in our own; None where it is, or is nothing that is
+    known."""
     for name in FORMATS.names():
         found = FORMATS.get(name)
         if found is not None and found.recognises(data):
-            return found.read
+            return found
     return None
+
+
+def format_names() -> list[str]:
+    """Names of the formats of other programs, sorted."""
+    return FORMATS.names()
 
 
 def register_class(class_name: str) -> Callable[[R], R]:

@@ -1,3 +1,3 @@
 """Umbrella meshes: cells of two plates and six arms that open to a surface."""
 
-from . import design  # noqa: F401  # registers the class
+from . import design, importer  # noqa: F401  # register the class and its format

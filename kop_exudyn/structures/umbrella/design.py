@@ -23,7 +23,6 @@ from ..base import (
     Target,
     register_centring,
     register_class,
-    register_format,
 )
 from ..fitting import best_placement
 from ..hardware import CellHardware
@@ -34,7 +33,7 @@ from .hardware import cell_hardware
 from .layout import BaseMesh, Plates, umbrella_mesh
 from .mesh import UmbrellaMesh, UmbrellaTarget
 from .pins import Anchor, Pins, anchor_on, pins_from_dict
-from .release import centred_release, is_release, release_mesh
+from .release import centred_release, release_mesh
 
 if TYPE_CHECKING:
     from ...equilibrium.equilibria import Equilibrium, Start
@@ -381,9 +380,6 @@ class Umbrella(Design):
         design = Umbrella(self.name, mesh, **(options | changes))
         design.loads, design.load_cases = self.loads, self.load_cases
         return design
-
-
-register_format("released umbrella mesh", is_release, Umbrella.from_release)
 
 
 def _laid_on(target: UmbrellaTarget, positions: np.ndarray) -> np.ndarray:

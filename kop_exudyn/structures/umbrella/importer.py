@@ -9,10 +9,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...errors import InputError
+from ..base import register_format
 from .bodies import RODS
-from .design import umbrella_from_dict
+from .design import Umbrella, umbrella_from_dict
 from .mesh import UmbrellaMesh
-from .release import release_mesh
+from .release import is_release, release_mesh
 
 _TOLERANCE = 1e-5  # of the compact mesh's size
 _DIGITS = 9
@@ -117,3 +118,6 @@ def _arms(mesh: UmbrellaMesh) -> np.ndarray:
         ],
         axis=1,
     )
+
+
+register_format("released umbrella mesh", is_release, Umbrella.from_release, import_release)
