@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .options import add_designs, add_selection
 from .output import add_json, report
-from .values import design_selection, number_pair, part_counts
+from .values import number_pair, part_counts
 
 if TYPE_CHECKING:
     from ..analysis.input_check import DesignCheck
@@ -31,9 +32,7 @@ _DEFAULT_PARTS = 8  # of a kind, where nothing is said about it
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "folder", type=Path, metavar="FOLDER|STUDY", help="folder of designs, or a study (.toml)"
-    )
+    add_designs(parser)
     parser.add_argument(
         "--parts",
         type=part_counts,
@@ -41,12 +40,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help=f"parts of the kit that the designs are compared by (default: what the study says, "
         f"else {_DEFAULT_PARTS} of each kind)",
     )
-    parser.add_argument(
-        "--designs",
-        type=design_selection,
-        metavar="N|NAMES",
-        help="the first N designs, or names of files without .json (default: all)",
-    )
+    add_selection(parser)
     parser.add_argument(
         "--harmonise",
         type=number_pair,

@@ -8,6 +8,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .options import add_run_or_design
 from .output import add_json, report
 from .values import not_negative_number, number_list, number_pair, positive_number
 
@@ -38,19 +39,7 @@ EXAMPLES = """examples:
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "what",
-        type=Path,
-        metavar="RESULT|DESIGN",
-        help="folder of a finished run, or a design file (.json or .json.gz)",
-    )
-    parser.add_argument(
-        "folder",
-        type=Path,
-        nargs="?",
-        metavar="FOLDER|STUDY",
-        help="of a result: the folder of the designs that it was made from, or the study file",
-    )
+    add_run_or_design(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write to")
     parser.add_argument(
         "--unit",

@@ -7,10 +7,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .options import add_cost, add_designs, add_processes, add_results, add_selection
 from .output import add_json, report
 from .values import (
-    design_selection,
-    kit_cost,
     not_negative,
     not_negative_number,
     part_counts,
@@ -46,12 +45,7 @@ _FIRST_PARTS = 8  # of a kind, where a search for the smallest kit begins
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "folder",
-        type=Path,
-        metavar="FOLDER|STUDY",
-        help="folder of design files, or a study file (.toml)",
-    )
+    add_designs(parser)
     parser.add_argument(
         "--parts",
         type=part_counts,
@@ -84,11 +78,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="find the smallest kit that keeps every design within this deviation from its target, "
         "in %% of its box; the search begins with --parts (default: 8 of each kind)",
     )
-    parser.add_argument(
-        "--cost",
-        type=kit_cost,
-        metavar="part=W,...",
-        help="with --max-deviation: what is to be small, weights of a part, a piece and a cut "
+    add_cost(
+        parser,
+        "with --max-deviation: what is to be small, weights of a part, a piece and a cut "
         "(default: part=1)",
     )
     parser.add_argument(
@@ -98,28 +90,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="of the objective's terms, as energy=0.05,stress=0.1; share is that of the joints' "
         "own places in fit",
     )
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="folder for the results"
-    )
-    parser.add_argument(
-        "--designs",
-        type=design_selection,
-        metavar="N|NAMES",
-        help="the first N designs, or names of files without .json (default: all)",
-    )
-    parser.add_argument("--resume", action="store_true", help="go on from the checkpoints in DIR")
-    parser.add_argument(
-        "--overwrite", action="store_true", help="write to DIR even if it holds something else"
-    )
-    parser.add_argument(
-        "--jobs",
-        type=positive,
-        metavar="N",
-        help="processes that solve designs (default: one a core); the result doesn't depend on it",
-    )
-    parser.add_argument(
-        "--seed", type=not_negative, metavar="N", help="of the clustering (default: 0)"
-    )
+    add_selection(parser)
+    add_results(parser)
+    add_processes(parser)
     parser.add_argument(
         "--max-steps",
         type=positive,
@@ -197,7 +170,6 @@ def run(args: argparse.Namespace) -> int:
     from ..kit.stock import Stock
     from ..provenance import usable_cores
     from ..report.kit_run import optimize_and_report
-    from ..search.objective import Weights
 
     study = load_study(args.folder, args.designs)
     if args.kit is not None and args.parts:
@@ -236,18 +208,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(
             "says nothing of the parts: --parts, --kit or --stock is required", source=args.folder
         )
-    Weights.of(args.weights or {})  # names that aren't terms are found before anything is read
-    study = replace(
-        study,
-        settings=replace(
-            study.settings,
-            requirements=_required(args, study.settings.requirements),
-            **_given(args),
-        ),
-        weights={**study.weights, **(args.weights or {})},
-    )
-    if args.samples is not None:
-        study = replace(study, verdict=replace(study.verdict, samples=args.samples))
+    study = _as_asked(args, study)
     designs = study.designs()
     result = optimize_and_report(
         designs,
@@ -293,6 +254,23 @@ def run(args: argparse.Namespace) -> int:
     return 1 if failed else 0
 
 
+def _as_asked(args: argparse.Namespace, study: Study) -> Study:
+    """The study with what the options change of its settings, weights and verdict."""
+    from dataclasses import replace
+
+    from ..search.objective import Weights
+
+    Weights.of(args.weights or {})  # names that aren't terms are found before anything is read
+    required = _required(args, study.settings.requirements)
+    samples = study.verdict.samples if args.samples is None else args.samples
+    return replace(
+        study,
+        settings=replace(study.settings, requirements=required, **_given(args)),
+        weights={**study.weights, **(args.weights or {})},
+        verdict=replace(study.verdict, samples=samples),
+    )
+
+
 def _smallest(args: argparse.Namespace, study: Study, parts: dict[str, int]) -> int:
     """The smallest kit within a deviation."""
     from dataclasses import replace
@@ -300,19 +278,8 @@ def _smallest(args: argparse.Namespace, study: Study, parts: dict[str, int]) -> 
     from ..analysis.sizes import KitCost
     from ..report.environment import usable_cores
     from ..report.sizes_run import smallest_and_report
-    from ..search.objective import Weights
 
-    Weights.of(args.weights or {})
-    study = replace(
-        study,
-        settings=replace(
-            study.settings,
-            requirements=_required(args, study.settings.requirements),
-            **_given(args),
-        ),
-        weights={**study.weights, **(args.weights or {})},
-        baselines=False,
-    )
+    study = replace(_as_asked(args, study), baselines=False)
     designs = study.designs()
     counts: dict[str, int] = {}
     for design in designs:

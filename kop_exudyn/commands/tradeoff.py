@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
+from .options import add_cost, add_designs, add_processes, add_results, add_selection
 from .output import add_json, report
-from .values import design_selection, kit_cost, not_negative, part_ranges, positive
+from .values import part_ranges
 
 HELP = "find kits of several sizes, and show what each part more is worth"
 DESCRIPTION = """Finds a kit for each of several sizes: the largest from scratch, every other one by
@@ -21,9 +21,7 @@ EXAMPLES = """examples:
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "folder", type=Path, metavar="FOLDER|STUDY", help="folder of designs, or a study (.toml)"
-    )
+    add_designs(parser)
     parser.add_argument(
         "--parts",
         type=part_ranges,
@@ -32,32 +30,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="from how many to how many parts of each kind, as linear=2:12,angular=5; A:B:STEP "
         "leaves some out. Kinds with as many numbers grow together",
     )
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="folder for the results"
-    )
-    parser.add_argument(
-        "--designs",
-        type=design_selection,
-        metavar="N|NAMES",
-        help="the first N designs, or names of files without .json (default: all)",
-    )
-    parser.add_argument(
-        "--cost",
-        type=kit_cost,
-        metavar="part=W,...",
-        help="of a part, a piece, a cut; shown with every kit (default: part=1)",
-    )
-    parser.add_argument("--resume", action="store_true", help="go on from the checkpoints in DIR")
-    parser.add_argument(
-        "--overwrite", action="store_true", help="write to DIR even if it holds something else"
-    )
-    parser.add_argument(
-        "--jobs",
-        type=positive,
-        metavar="N",
-        help="processes that solve designs (default: one a core); the result doesn't depend on it",
-    )
-    parser.add_argument("--seed", type=not_negative, metavar="N", help="of the clustering")
+    add_selection(parser)
+    add_results(parser)
+    add_cost(parser, "of a part, a piece, a cut; shown with every kit (default: part=1)")
+    add_processes(parser)
     add_json(parser)
 
 

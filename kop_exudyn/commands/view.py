@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .options import add_run_or_design
 from .output import add_json, report
 from .values import not_negative
 
@@ -25,19 +26,7 @@ EXAMPLES = """examples:
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "what",
-        type=Path,
-        metavar="RESULT|DESIGN",
-        help="folder of a finished run, or a design file (.json or .json.gz)",
-    )
-    parser.add_argument(
-        "folder",
-        type=Path,
-        nargs="?",
-        metavar="FOLDER|STUDY",
-        help="of a result: the folder of the designs that it was made from, or the study file",
-    )
+    add_run_or_design(parser)
     parser.add_argument(
         "--out", type=Path, required=True, metavar="PAGE", help="page to write (.html)"
     )

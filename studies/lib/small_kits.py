@@ -8,19 +8,14 @@ each. With four pieces and two parts there are 36 assignments that differ by mor
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import cached_property
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from kop_exudyn.equilibrium.newton import Equilibrium, solve
 from kop_exudyn.kit.cluster import best_parts
 from kop_exudyn.kit.elements import Labels, collect
-from kop_exudyn.kit.groups import ElementGroup
 from kop_exudyn.kit.parts import Assignment, Kit
-from kop_exudyn.rods.rotations import rotation_z
-from kop_exudyn.scene.builder import SceneBuilder
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.objective import Weights
 from kop_exudyn.search.pool import DesignPool
@@ -31,67 +26,18 @@ from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.search.stages import Stages
-from kop_exudyn.structures.base import Design, Role, Target
 
-SECTION = np.array([1e5, 4e4, 4e4, 0.8, 1.0, 1.0])  # slender: EA L^2 / EI is about 1e5
+from .stress.arch import Arch
+
 _DAMPING = 1e-3  # of the model that parts start from
 _SAME = 1e-3  # of J: optima that close are one
 
 
-class Strip(Design):
-    """Pieces of given lengths in a row, their outer ends pinned `span` apart; bulges to +y.
-
-    pieces : (n, 2) lengths of each piece before and after its joint
-    """
-
-    class_name = "strip"
-
-    def __init__(self, name: str, pieces: np.ndarray, span: float):
-        self.name, self.span = name, span
-        self.parameters = np.asarray(pieces, float).ravel()
-        n = len(self.parameters)
-        self.lower, self.upper = np.full(n, 0.02), np.full(n, np.inf)
-        self.groups = [ElementGroup("linear", np.arange(n).reshape(-1, 2))]
-        self.roles = (Role("deployed", fitted=True),)
-        self._scene = self._build()
-
-    def _build(self) -> Any:
-        q = self.parameters
-        stations = np.concatenate([[0], np.cumsum(q)]) / q.sum()
-        fine = np.interp(np.linspace(0, len(q), 2 * len(q) + 1), np.arange(len(q) + 1), stations)
-        rise = 0.5 * np.sqrt(q.sum() ** 2 - self.span**2)
-        places = np.stack([fine * self.span, rise * np.sin(np.pi * fine), 0 * fine], axis=1)
-        slope = np.arctan2(rise * np.pi * np.cos(np.pi * fine), self.span)
-        builder = SceneBuilder(len(q))
-        bodies = builder.bodies(places, rotation_z(slope))
-        nodes = builder.nodes(bodies)
-        for k in range(len(q)):
-            builder.rod(nodes[2 * k : 2 * k + 3], SECTION, parameter=k)
-        builder.pin(bodies[0], (0, 1, 2, 3, 4))
-        builder.pin(bodies[-1], (0, 1, 2, 3))
-        self.joints = bodies[2:-1:4]
-        return builder.build()
-
-    def scene(self, role: str) -> Any:
-        return self._scene
-
-    def deploy(self, q: np.ndarray | None = None) -> dict[str, Equilibrium]:
-        return {"deployed": solve(self.systems["deployed"], self.parameters if q is None else q)}
-
-    @cached_property
-    def target(self) -> Target:
-        joints = self.deploy()["deployed"].state.positions[self.joints]
-        strip = np.concatenate([joints + [0, 0, z] for z in (-0.1, 0.1)])
-        n = len(joints)
-        faces = [f for k in range(n - 1) for f in ((k, k + 1, n + k), (k + 1, n + k + 1, n + k))]
-        return Target(strip, np.array(faces), joints, float(np.linalg.norm(np.ptp(joints, axis=0))))
-
-
-def strip_of(seed: int) -> Strip:
+def strip_of(seed: int) -> Arch:
     """A random strip of four pieces."""
     rng = np.random.default_rng(seed)
     pieces = rng.uniform(0.08, 0.16, (4, 2))
-    return Strip(f"strip {seed}", pieces, rng.uniform(0.75, 0.9) * pieces.sum())
+    return Arch(f"strip {seed}", pieces, rng.uniform(0.75, 0.9) * pieces.sum())
 
 
 def assignments(n: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -145,7 +91,7 @@ def _finite(value: float | None) -> float:
     return float("inf") if value is None else value
 
 
-def _all_values(strip: Strip) -> list[float]:
+def _all_values(strip: Arch) -> list[float]:
     """J of every assignment, its parts at their minimum; infinite where the strip fails."""
     found = []
     with DesignPool([strip], 1) as pool:

@@ -145,7 +145,11 @@ def test_variations_are_valid(c_shell_data, change):
         (["version"], ..., "version = '(missing)': unknown version; this kop_exudyn reads 1"),
         (["class"], ..., "class: is missing"),
         (["class"], "../kit", "class = '../kit': "),
-        (["class"], "d_shell", "class = 'd_shell': unknown structure class (known: "),
+        (
+            ["class"],
+            "d_shell",
+            "class = 'd_shell': unknown structure class (did you mean 'c_shell'? ",
+        ),
     ],
 )
 def test_mistakes(c_shell_data, write_json_file, path, value, expected):

@@ -1,5 +1,5 @@
-"""A structure class that costs next to nothing: the optimiser's stress tests run whole jobs with it
-in a second.
+"""A structure class that costs next to nothing: stress tests run whole jobs with it in a second,
+and the study of small optima tries every assignment.
 
 A planar elastica arch: a straight strip of pieces in a row, its ends held closer together than it
 is long. Elements are the two pieces beside a joint. Importing this module registers the class under
@@ -23,7 +23,7 @@ from kop_exudyn.scene.builder import SceneBuilder
 from kop_exudyn.scene.scene import Scene
 from kop_exudyn.structures.base import Design, Role, Target, register_class
 
-_SECTION = np.array([1e5, 4e4, 4e4, 0.8, 1.0, 1.0])
+_SECTION = np.array([1e5, 4e4, 4e4, 0.8, 1.0, 1.0])  # slender: EA L^2 / EI is about 1e5
 
 
 class Arch(Design):
