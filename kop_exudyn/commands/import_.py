@@ -4,6 +4,7 @@ our own."""
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -42,6 +43,16 @@ EXAMPLES = """examples:
   kop import hemisphere_5t.json.gz --out hemisphere.json --plates rigid"""  # noqa: E501  # a command on one line can be copied
 
 _CLASSES = ("c_shell", "grid", "umbrella")
+# Options that only some classes have: of others they would be passed over without a word.
+_OF_CLASSES = {
+    "opening": ("c_shell",),
+    "target": ("c_shell",),
+    "surface": ("grid",),
+    "held": ("grid",),
+    "patch": ("umbrella",),
+    "section": ("c_shell", "grid"),
+    "material": ("c_shell", "grid"),
+}
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -207,13 +218,25 @@ def run(args: argparse.Namespace) -> int:
     from ..errors import InputError
     from ..exchange.curve_files import CURVE_READERS, is_drawing
     from ..files.files import check_output_file
+    from ..geometry.mesh_files import MESH_SUFFIXES
 
+    if os.path.isdir(args.file):
+        raise InputError("is a folder, expected a file", source=args.file)
+    known = sorted({*CURVE_READERS, *MESH_SUFFIXES, ".json.gz"})
+    if not args.file.name.lower().endswith(tuple(known)):
+        raise InputError(f"can't be imported (known: {', '.join(known)})", source=args.file)
     if args.out is None and args.preview is None:
         raise InputError("nothing to do: give --out, --preview or both", source=args.file)
     for path in filter(None, (args.out, args.preview)):
         check_output_file(path, overwrite=args.overwrite)
     drawn = is_drawing(args.file)
     wanted = args.kind or ("c_shell" if drawn and args.patch is None else None)
+    for option, classes in _OF_CLASSES.items():
+        if getattr(args, option) is not None and (wanted or "umbrella") not in classes:
+            raise InputError(
+                f"isn't for this import: it is for designs of class {' and '.join(classes)}",
+                field=f"--{option}",
+            )
     if wanted in (None, "umbrella"):
         return _undrawn(args)
     if not drawn:

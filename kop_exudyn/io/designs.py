@@ -24,6 +24,8 @@ def load_design(path: str | Path) -> Design:
     Raises InputError naming the file, the field and the value when anything is wrong with it.
     """
     data = read_json(path)
+    if isinstance(data, dict) and str(data.get("format", "")).startswith("kop_exudyn/"):
+        check_envelope(data, "design", DESIGN_VERSION, source=path)  # or another file of ours
     check_range(data, source=path)
     if (foreign := foreign_format(data)) is not None:
         try:

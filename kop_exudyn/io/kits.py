@@ -7,8 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..files.documents import check_envelope, check_schema
+import numpy as np
+
+from ..errors import InputError
+from ..files.documents import check_envelope, check_range, check_schema
 from ..files.json_files import read_json, write_json
+from ..kit.kinds import part_kind
 from ..kit.parts import Kit
 from ..units import units_from_dict
 
@@ -19,9 +23,26 @@ def load_kit(path: str | Path) -> Kit:
     """The kit of a file; InputError when it is damaged or its parts can't be parts."""
     data = read_json(path)
     check_envelope(data, "kit", KIT_VERSION, source=path)
+    check_range(data, source=path)
     check_schema(data, "kit", source=path)
     kit = Kit.from_dict(data["parts"], source=str(path))
+    try:
+        check_lengths(kit)
+    except InputError as error:
+        raise error.at(str(path)) from None
     return replace(kit, units=units_from_dict(data.get("units")))
+
+
+def check_lengths(kit: Kit) -> None:
+    """Raise InputError for a part all of whose lengths are zero: there is no such piece."""
+    for kind, parts in kit.parts.items():
+        nothing = np.flatnonzero(~parts.any(axis=1))
+        if len(nothing) and not part_kind(kind).angular:
+            raise InputError(
+                "is a part without any length",
+                field=f"kit.{kind}[{nothing[0]}]",
+                value=parts[nothing[0]].tolist(),
+            )
 
 
 def save_kit(path: str | Path, kit: Kit, *, overwrite: bool = False) -> Path:

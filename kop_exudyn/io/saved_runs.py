@@ -13,6 +13,7 @@ from ..equilibrium.equilibria import Equilibrium, Start
 from ..equilibrium.newton import solve
 from ..errors import InputError, SimulationFailure
 from ..files.arrays import numbers_of
+from ..kit.groups import ElementGroup
 from ..kit.optimality import ClusteringGap
 from ..kit.parts import Assignment, Kit
 from ..scene.state import State
@@ -56,7 +57,12 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
     )
     realised = np.split(assignment.matrix(kit) @ kit.vector, offsets[1:-1])
     references = [_reference(design, states) for design in designs]
-    weights = _weights(data["settings"], designs)
+    try:
+        weights = _weights(data["settings"], designs)
+    except InputError as error:
+        raise error.at(path) from None
+    ends = [assignment.matrix(kit, upper) @ kit.vector for upper in (False, True)]
+    _check_kit(designs, groups, states, ends, path)
     objectives = [
         DesignObjective(design, weights, reference=reference)
         for design, reference in zip(designs, references)
@@ -96,6 +102,12 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
                 data.get("status", {}).get(stage, ""),
                 _jumps(data, stage),
             )
+    if _LAST not in result.stages:
+        raise InputError(
+            "lacks the states of the designs built from the kit",
+            source=folder / "states.npz",
+            field=_LAST,
+        )
     result.redeployed = (
         _all(
             [
@@ -106,6 +118,39 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
         or ()
     )
     return result
+
+
+def _check_kit(
+    designs: Sequence[Design],
+    groups: Sequence[ElementGroup],
+    states: Mapping[tuple[str, str, str], Any],
+    ends: Sequence[np.ndarray],
+    path: Path,
+) -> None:
+    """Raise InputError unless the last stage's states were found with the parts that the result
+    names: files of two runs don't go together.
+
+    groups : of all designs; ends : (n_q,) the least and the largest that the parts realise
+    """
+    of_parts = np.zeros(len(ends[0]), dtype=bool)
+    for group in groups:
+        of_parts[group.indices] = True
+    start = 0
+    for design in designs:
+        own = slice(start, start := start + len(design.parameters))
+        saved = _saved(design, _LAST, states)
+        found = next(iter(saved.values())).get("parameters") if saved else None
+        if found is None or found.shape != design.parameters.shape:
+            continue  # of an earlier version, or refused where its states are read
+        least, most = (end[own] for end in ends)
+        near = 1e-6 * np.abs(np.concatenate([least, most])).max()
+        if np.any(((found < least - near) | (found > most + near)) & of_parts[own]):
+            raise InputError(
+                f"its states are those of another kit than the one in {path.name}: keep the files "
+                "of a run together",
+                source=path.with_name("states.npz"),
+                field=f"{design.name}/{_LAST}",
+            )
 
 
 def _all(outcomes: Sequence[Outcome | None]) -> list[Outcome] | None:

@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..files.documents import check_envelope, check_schema
+from ..files.documents import LARGEST_WHOLE, check_envelope, check_range, check_schema
 from ..files.files import read_bytes
 from ..files.json_files import read_json
 from ..kit.kinds import kind_names, part_kind
 from ..kit.parts import Kit
 from ..kit.stock import Stock
 from ..units import units_from_dict
+from .kits import check_lengths
 
 STOCK_VERSION = 1
 _OWN_COLUMNS = ("kind", "count")
@@ -41,6 +42,7 @@ def load_stock(path: str | Path, *, together: bool = False) -> Stock:
     else:
         data = read_json(path)
         check_envelope(data, "stock", STOCK_VERSION, source=path)
+        check_range(data, source=path)
         check_schema(data, "stock", source=path)
         rows = [(f"pieces[{n}]", entry) for n, entry in enumerate(data["pieces"])]
         units = units_from_dict(data.get("units"))
@@ -54,6 +56,7 @@ def load_stock(path: str | Path, *, together: bool = False) -> Stock:
     parts = {kind: np.array(list(own)) for kind, own in counts.items()}
     try:
         kit = Kit(parts, units)
+        check_lengths(kit)
         pieces = {kind: np.array(list(own.values())) for kind, own in counts.items()}
         return Stock(kit, pieces, together)
     except InputError as error:
@@ -126,13 +129,14 @@ def _csv_row(line: int, row: Mapping[str, Any], path: Path) -> tuple[str, dict[s
         if name not in _OWN_COLUMNS and text
     }
     count = _number(cells["count"], path, f"{field}, count")
-    if count < 0 or count != int(count):
+    if not 0 <= count <= LARGEST_WHOLE or count != int(count):
         raise InputError(
-            "expected a whole number, not negative",
+            "expected a whole number from 0 to 2^53",
             source=path,
             field=f"{field}, count",
             value=cells["count"],
         )
+    check_range(parameters, f"{path}: {field}")
     return field, {"kind": cells["kind"], "parameters": parameters, "count": int(count)}
 
 

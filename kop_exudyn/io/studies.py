@@ -16,7 +16,7 @@ from ..analysis.verdict import VerdictSettings
 from ..errors import InputError
 from ..files.documents import check_envelope, check_range, check_schema
 from ..files.files import read_bytes
-from ..kit.kinds import Bounds
+from ..kit.kinds import Bounds, part_kind
 from ..search.objective import Weights
 from ..search.requirements import Requirements
 from ..search.settings import JobSettings, StageSettings
@@ -114,7 +114,10 @@ def _from_file(path: Path) -> Study:
     if "schedule" in settings:
         settings["schedule"] = tuple(settings["schedule"])
     if "bounds" in settings:
-        settings["bounds"] = _bounds(settings["bounds"])
+        try:
+            settings["bounds"] = _bounds(settings["bounds"])
+        except InputError as error:
+            raise error.at(path) from None
     return Study(
         path,
         tuple(counts),
@@ -167,7 +170,16 @@ def _files(entries: Sequence[str | Mapping[str, Any]], path: Path) -> dict[Path,
 
 
 def _bounds(data: Mapping[str, Mapping[str, Any]]) -> Bounds:
-    """By kind (lower, upper); what isn't given is no bound."""
+    """By kind (lower, upper); what isn't given is no bound. Raises InputError."""
+    for kind, given in data.items():
+        names = part_kind(kind).parameter_names
+        for side, values in given.items():
+            if isinstance(values, list) and len(values) != len(names):
+                raise InputError(
+                    f"expected one number, or {len(names)} ({', '.join(names)})",
+                    field=f"settings.bounds.{kind}.{side}",
+                    value=values,
+                )
     return {
         kind: tuple(
             np.array(given.get(side, none), float)

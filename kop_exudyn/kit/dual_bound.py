@@ -104,7 +104,7 @@ def lower_bound(
             reach *= 0.6
         if value > best:
             best, centre = value, prices
-        cuts.add(_cuts_of(pricing, prices, found), weights * centre)
+        cuts.add(_cuts_of(pricing, prices, found, not len(cuts.cost)), weights * centre)
         prices = _master(cuts, weights, centre, reach, m)
         promised = float(weights @ prices) - m * float(
             (cuts.served @ (weights * prices) - cuts.cost).max()
@@ -147,11 +147,14 @@ def _priced(
     return np.concatenate([parts, known, better]), most
 
 
-def _cuts_of(pricing: Pricing, prices: np.ndarray, parts: np.ndarray) -> _Cuts:
-    """The cuts of the parts that earn most, one for each set of served rows."""
+def _cuts_of(pricing: Pricing, prices: np.ndarray, parts: np.ndarray, needed: bool) -> _Cuts:
+    """The cuts of the parts that earn most, one for each set of served rows; where they are needed,
+    at least one."""
     earned = pricing.earnings(prices, parts)
     order = np.argsort(-earned, kind="stable")
-    order = order[earned[order] > _GOOD * earned.max()]
+    good = earned[order] > _GOOD * earned.max()
+    # there has to be a cut, also where no part earns anything, as bounds keep all of them far away
+    order = order[good] if good.any() or not needed else order[:1]
     squared = pricing.squared(parts[order])
     served = prices[None] > squared.T
     first = np.sort(np.unique(served, axis=0, return_index=True)[1])[:_NEW_CUTS]

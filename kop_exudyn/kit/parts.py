@@ -232,6 +232,13 @@ class Assignment:
             raise InputError("doesn't fit the elements of these designs", source=source)
         assignment = cls(tuple(groups), part, variant, n_q)
         for group, parts, variants, chosen in assignment._filled():
+            if group.kind not in kit.parts:
+                raise InputError(
+                    "the kit has no parts of this kind",
+                    source=source,
+                    field="kit",
+                    value=group.kind,
+                )
             if not (_within(parts, len(kit[group.kind])) and _within(chosen, len(variants.names))):
                 raise InputError(
                     "names a part or variant that doesn't exist", source=source, field=group.kind

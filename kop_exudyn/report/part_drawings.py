@@ -68,9 +68,9 @@ def _drawn(shapes: Iterable[Template], parts: PartsList) -> Iterable[PartDrawing
     for template in shapes:
         kind, k = of_label.get(template.label, ("", 0))
         colour = colours[kind][k] if kind else np.array(_NEUTRAL)
-        scale = _WIDEST / widest
+        scale = _WIDEST / widest if widest > 0 else 1.0
         width, height = template.size
-        scale = max(scale, min(_WIDEST / width, _LEAST / height)) if height else scale
+        scale = max(scale, min(_WIDEST / width, _LEAST / height)) if height and width else scale
         counts = tuple(int(n) for n in parts.counts[kind][:, k]) if kind else ()
         yield PartDrawing(
             template.label,

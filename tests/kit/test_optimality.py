@@ -122,6 +122,16 @@ def test_bounds_on_parts_count():
     assert gap.gap_percent < 5.0
 
 
+@pytest.mark.parametrize(("kind", "least"), [("linear", 1e3), ("cell", 3.0)])
+def test_bounds_far_from_all_elements_leave_a_bound(kind, least):
+    """No part earns anything at the prices that are tried first."""
+    groups, q = problem(kind, 6, 0)
+    bounds = {kind: (np.full(2, least), np.full(2, np.inf))}
+    kit = Kit({kind: np.full((8, 2), least)})
+    gap = clustering_gaps(groups, q, kit, bounds=bounds)[kind]
+    assert 0 < gap.bound <= gap.energy
+
+
 def test_angles_are_exact_and_units_change_nothing():
     groups, q = problem("angular", 50, 5)
     found = cluster(groups, q, {"angular": 4})
