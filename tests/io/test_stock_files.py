@@ -58,7 +58,7 @@ def test_json_by_order_and_by_name(tmp_path):
         ("kind,count,l1,l2\nlinear,1,-1,2\n", r"kit.linear\[0\]"),
         ("kind,count,l1,l2\nlinear,1,1\n", "line 2: has another number of cells"),
         ("kind,count,l1,l2\nlinear,1,1,2,3\n", "line 2: has another number of cells"),
-        ("kind,count,l1,l2\nlinear,1e30,1,2\n", "counts.linear"),
+        ("kind,count,l1,l2\nlinear,1e30,1,2\n", "line 2, count = .1e30"),
     ],
 )
 def test_unusable_tables(text, message, tmp_path):
