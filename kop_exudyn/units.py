@@ -167,6 +167,21 @@ def common_units(named: Mapping[str, Units | None], what: str = "designs") -> Un
     return units
 
 
+def unnamed_units(named: Mapping[str, Units | None]) -> str | None:
+    """A sentence about files that name no units, beside others that do; None where there are none:
+    their numbers are then taken for the same units.
+
+    named : what each file is called -> its units
+    """
+    without = [name for name, units in named.items() if units is None]
+    given = [units for units in named.values() if units is not None]
+    if not without or not given:
+        return None
+    names = ", ".join(without)
+    verb = "name" if len(without) > 1 or names.endswith("designs") else "names"
+    return f"{names} {verb} no units: taken for {given[0]}, as the rest is in"
+
+
 def _mass_name(units: Units) -> str:
     for kilograms, name in _MASSES.items():
         if abs(units.kilograms / kilograms - 1) < 1e-9:

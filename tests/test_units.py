@@ -10,6 +10,7 @@ from kop_exudyn.errors import InputError
 from kop_exudyn.io.designs import load_all
 from kop_exudyn.io.kits import load_kit, save_kit
 from kop_exudyn.kit.parts import Kit
+from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.units import FORCES, LENGTHS, Units, common_units, unit_of, with_unit
 
 NEWTON_METRES = Units("m", "N")
@@ -78,6 +79,42 @@ def test_designs_of_different_units_make_no_kit(c_shell_data, write_json_file):
     with pytest.raises(InputError, match="need the same units: m has m, N, mm has mm, N"):
         load_all(files, "folder")
     assert [design.units for design in load_all(files[:1], "folder")] == [NEWTON_METRES]
+
+
+def test_what_names_no_units_beside_what_does_is_said(
+    c_shell_data, write_json_file, monkeypatch, caplog
+):
+    metres = {"units": {"length": "m", "force": "N"}}
+    files = [
+        write_json_file("a.json", c_shell_data | {"name": "a"} | metres),
+        write_json_file("b.json", c_shell_data | {"name": "b"}),
+    ]
+    load_all(files[:1], "folder")
+    load_all(files[1:], "folder")
+    assert not caplog.records
+    both = load_all(files, "folder")
+    assert caplog.messages == ["folder: b names no units: taken for m, N, as the rest is in"]
+
+    class Reached(Exception):
+        """The search has begun."""
+
+    def begin(*arguments):
+        raise Reached
+
+    monkeypatch.setattr("kop_exudyn.search.run.DesignPool", begin)
+    parts = {"linear": np.array([[1.0, 1.0]]), "angular": np.array([0.1])}
+    for units, designs, said in (
+        (None, both[:1], ["the kit names no units: taken for m, N, as the rest is in"]),
+        (Units("mm"), both[1:], ["the designs name no units: taken for mm, N, as the rest is in"]),
+        (Units("m"), both[:1], []),
+        (None, both[1:], []),
+    ):
+        caplog.clear()
+        with pytest.raises(Reached):
+            optimize_kit(designs, kit=Kit(parts, units))
+        assert caplog.messages == said
+    with pytest.raises(InputError, match="the kit has mm, N, the designs has m, N"):
+        optimize_kit(both[:1], kit=Kit(parts, Units("mm")))
 
 
 def test_a_design_file_with_unknown_units(c_shell_data, write_json_file, capsys):

@@ -231,7 +231,8 @@ def run(args: argparse.Namespace) -> int:
         check_output_file(path, overwrite=args.overwrite)
     drawn = is_drawing(args.file)
     wanted = args.kind or ("c_shell" if drawn and args.patch is None else None)
-    for option, classes in _OF_CLASSES.items():
+    lacks_patch = drawn and wanted == "umbrella" and args.patch is None  # is said below
+    for option, classes in () if lacks_patch else _OF_CLASSES.items():
         if getattr(args, option) is not None and (wanted or "umbrella") not in classes:
             raise InputError(
                 f"isn't for this import: it is for designs of class {' and '.join(classes)}",

@@ -3,6 +3,7 @@ study file."""
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 from collections.abc import Iterable, Sequence
@@ -13,7 +14,9 @@ from ..files.documents import check_envelope, check_range, check_schema, has_sch
 from ..files.files import reason_of
 from ..files.json_files import JSON_ENDINGS, read_json
 from ..structures.base import Design, design_from_dict, foreign_format
-from ..units import common_units
+from ..units import common_units, unnamed_units
+
+log = logging.getLogger(__name__)
 
 DESIGN_VERSION = 2
 
@@ -53,10 +56,13 @@ def load_all(files: Iterable[Path], source: str | Path) -> list[Design]:
                 "two designs have the same name", source=source, field="name", value=design.name
             )
         seen[design.name] = design
+    units = {design.name: design.units for design in designs}
     try:
-        common_units({design.name: design.units for design in designs})
+        common_units(units)
     except InputError as error:
         raise error.at(source) from None
+    if doubt := unnamed_units(units):
+        log.warning("%s: %s", source, doubt)
     return designs
 
 

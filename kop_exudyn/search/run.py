@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from time import perf_counter
@@ -17,7 +18,7 @@ from ..kit.optimality import clustering_gaps
 from ..kit.parts import Kit
 from ..kit.stock import Missing, Stock
 from ..structures.base import Design
-from ..units import common_units
+from ..units import common_units, unnamed_units
 from .assigned import opened_stage
 from .dataset import Dataset
 from .events import UNRELAXED, Observer, StageEvent
@@ -31,6 +32,8 @@ from .settings import JobSettings
 from .stage_results import StageResult
 from .stages import NoStore, Stages, Store
 from .starts import assigned_from_starts
+
+log = logging.getLogger(__name__)
 
 
 def optimize_kit(
@@ -72,6 +75,11 @@ def optimize_kit(
     """
     begin = perf_counter()
     check_request(designs, parts, kit, settings)
+    if kit is not None:
+        given = kit.kit.units if isinstance(kit, Stock) else kit.units
+        named = {design.name: design.units for design in designs}
+        if doubt := unnamed_units({"the kit": given, "the designs": common_units(named)}):
+            log.warning("%s", doubt)
     sought: Mapping[str, int] | Kit | Stock = kit if kit is not None else dict(parts or {})
     events: list[StageEvent] = []
 
