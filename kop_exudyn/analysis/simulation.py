@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Numbers, Points
 from ..compiled.library import library
 from ..equilibrium.engines import FAST
 from ..equilibrium.engines import engine as solver_of
@@ -55,7 +56,7 @@ class SimulationResult:
     equilibria: dict[str, Equilibrium]
     confirmations: dict[str, Confirmation]
     fit: FitResult
-    joints: np.ndarray
+    joints: Points
     loaded: LoadedState | None = None
     engine: str = FAST
     checks: tuple[LoadCheck, ...] = ()
@@ -72,13 +73,13 @@ class SimulationResult:
         return design_strength(self.design, {role: self.deployed})[role]
 
     @property
-    def stress(self) -> np.ndarray:
+    def stress(self) -> Numbers:
         """(E,) equivalent stress (von Mises) of the deployed state's rod elements, in the design's
         unit of force / length^2; NaN where an element has no section."""
         return self.strength.equivalent
 
     @property
-    def utilisation(self) -> np.ndarray:
+    def utilisation(self) -> Numbers:
         """(E,) that stress over the elastic limit; above 1 a rod yields or breaks. NaN where no
         limit is known."""
         return self.strength.utilisation

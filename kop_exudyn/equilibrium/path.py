@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Parameters
 from ..errors import SimulationFailure
 from ..scene.loads import HingeTorques, Scaled
 from ..scene.scene import Scene
@@ -127,7 +128,7 @@ class Path:
 
 def trace_path(
     scene: Scene,
-    q: np.ndarray,
+    q: Parameters,
     load: Any = None,
     *,
     stop: Callable[[PathPoint], bool],

@@ -12,6 +12,15 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from ..arrays import (
+    Indices,
+    Numbers,
+    ParameterHessian,
+    ParameterRows,
+    Parameters,
+    Stresses,
+    StressRows,
+)
 from ..rods.element import length_derivative
 from ..scene.scene import Scene
 from ..scene.state import State
@@ -70,11 +79,11 @@ class Sensitivities:
         )
 
     @property
-    def full(self) -> np.ndarray:
+    def full(self) -> ParameterRows:
         """x_q as one array (n_free, n_parameters), copied from the solutions each time."""
         return self.solutions.rows(np.arange(self._n))
 
-    def rows(self, dofs: np.ndarray) -> np.ndarray:
+    def rows(self, dofs: Indices) -> ParameterRows:
         """Derivatives (m, n_parameters) of any unknowns of the scene, pinned (zero) and driven ones
         included."""
         kept = self._system.sparsity.kept[dofs]
@@ -85,30 +94,30 @@ class Sensitivities:
         out[driven] = self._driven_map[kept[driven] - self._n].toarray()
         return out
 
-    def positions(self, bodies: np.ndarray) -> np.ndarray:
+    def positions(self, bodies: Indices) -> ParameterRows:
         """Derivatives (3 m, n_parameters) of body positions (m,), x y z after each other a body."""
         return self.rows((6 * np.asarray(bodies)[:, None] + np.arange(3)).ravel())
 
-    def angles(self, hinges: np.ndarray) -> np.ndarray:
+    def angles(self, hinges: Indices) -> ParameterRows:
         """Derivatives (m, n_parameters) of hinge angles."""
         return self.rows(6 * self._system.scene.n_bodies + np.asarray(hinges))
 
     @cached_property
-    def torque_gradient(self) -> np.ndarray:
+    def torque_gradient(self) -> Parameters:
         """Derivative (n_parameters,) of the actuation's multiplier, zero without actuation."""
         if self._border is None:
             return np.zeros(self._system.scene.n_parameters)
         return -(self._residual_q.T @ self._border.column) / self._border.schur
 
     @cached_property
-    def opening_derivative(self) -> tuple[np.ndarray, float]:
+    def opening_derivative(self) -> tuple[Numbers, float]:
         """Derivatives of the free unknowns (n_free,) and of the torque in the opening angle."""
         if self._border is None:
             raise ValueError("the scene has no opening angle")
         d, t = bordered_solve(self.system, self._border, np.zeros(self._n), 1.0)
         return d, float(t)
 
-    def adjoint(self, dofs: np.ndarray, cotangent: np.ndarray) -> np.ndarray:
+    def adjoint(self, dofs: Indices, cotangent: Numbers) -> Parameters:
         """Gradient (n_parameters,) of J given dJ/d(unknowns) (m,) at some unknowns: one solve, no
         x_q."""
         kept = self._system.sparsity.kept[dofs]
@@ -118,7 +127,7 @@ class Sensitivities:
 
     # -- stresses ------------------------------------------------------------------------------
     @cached_property
-    def stresses(self) -> np.ndarray:
+    def stresses(self) -> StressRows:
         """Derivatives (E, 6, n_parameters) of the elements' generalised stresses; memory E x 6 x
         n_parameters."""
         scene, s = self._system.scene, self._system.sparsity
@@ -136,7 +145,7 @@ class Sensitivities:
         )
         return out
 
-    def stresses_of(self, elements: np.ndarray) -> np.ndarray:
+    def stresses_of(self, elements: Indices) -> StressRows:
         """Derivatives (m, 6, n_parameters) of some elements' generalised stresses."""
         scene, s = self._system.scene, self._system.sparsity
         own = s.rows[elements]
@@ -157,7 +166,7 @@ class Sensitivities:
         )
         return out
 
-    def stress_adjoint(self, cotangent: np.ndarray) -> np.ndarray:
+    def stress_adjoint(self, cotangent: Stresses) -> Parameters:
         """Gradient (n_parameters,) of J given dJ/d(generalised stresses) (E, 6): one solve, no
         x_q."""
         explicit = np.einsum("er,er->e", self._stress_L, cotangent)
@@ -165,14 +174,14 @@ class Sensitivities:
 
     # -- energies ------------------------------------------------------------------------------
     @cached_property
-    def potential_gradient(self) -> np.ndarray:
+    def potential_gradient(self) -> Parameters:
         """d(potential)/dq (n_parameters,): by the envelope theorem only the explicit part
         counts."""
         explicit = self._by_parameter(self._energy_L + self._weight_energy_L())
         return explicit + self._driven_map.T @ self._gradient[self._n :]
 
     @cached_property
-    def energy_gradient(self) -> np.ndarray:
+    def energy_gradient(self) -> Parameters:
         """d(elastic energy)/dq (n_parameters,), the work of loads and actuators taken out by one
         adjoint solve."""
         if not self._loaded:
@@ -180,7 +189,7 @@ class Sensitivities:
         return self._by_parameter(self._energy_L) + self._by_load(self._elastic_gradient())
 
     @cached_property
-    def potential_hessian(self) -> np.ndarray:
+    def potential_hessian(self) -> ParameterHessian:
         """Exact d2(potential)/dq2 (n_parameters, n_parameters): Pi_qq + Pi_qx x_q."""
         scene = self._system.scene
         twice = np.zeros(scene.n_parameters)
@@ -202,13 +211,13 @@ class Sensitivities:
         return hessian
 
     @property
-    def energy_hessian(self) -> np.ndarray:
+    def energy_hessian(self) -> ParameterHessian:
         """Exact d2(elastic energy)/dq2 of an unloaded scene; of a loaded one the potential's, a
         model of it."""
         return self.potential_hessian
 
     # -- use -----------------------------------------------------------------------------------
-    def predict(self, dq: np.ndarray, dopening: float = 0.0) -> Start:
+    def predict(self, dq: Parameters, dopening: float = 0.0) -> Start:
         """First-order prediction of the equilibrium at q + dq and opening + dopening: one solve."""
         system, eq = self.system, self.equilibrium
         rhs = -(self._residual_q @ dq)

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..arrays import Parameters
 from ..errors import InputError
 from .assign import to_assignment
 from .elements import KindElements, Labels, Penalties, collect
@@ -40,7 +41,7 @@ class Clustering:
 
 def cluster(
     groups: Sequence[ElementGroup],
-    q: np.ndarray,
+    q: Parameters,
     parts: Mapping[str, int],
     *,
     bounds: Bounds | None = None,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
+from ..arrays import ElementIndices
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class ElementGroup:
     """
 
     kind: str
-    indices: np.ndarray
+    indices: ElementIndices
 
     def __repr__(self) -> str:
         n, k = self.indices.shape

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from ..arrays import Indices, KitVector, ParameterFlags, Parameters, Parts
 from ..errors import InputError
 from ..units import Units
 from .groups import ElementGroup
@@ -28,7 +29,7 @@ class Kit:
     by parameter.
     """
 
-    parts: Mapping[str, np.ndarray]
+    parts: Mapping[str, Parts]
     units: Units | None = None
 
     def __post_init__(self) -> None:
@@ -40,7 +41,7 @@ class Kit:
         unit = "" if self.units is None else f", in {self.units.length}"
         return f"<Kit: {sizes} parts{unit}>"
 
-    def __getitem__(self, kind: str) -> np.ndarray:
+    def __getitem__(self, kind: str) -> Parts:
         """(m, k_p) parts of a kind; InputError when the kit has none."""
         if kind not in self.parts:
             raise InputError("the kit has no parts of this kind", field="kit", value=kind)
@@ -52,7 +53,7 @@ class Kit:
         return {name: len(parts) for name, parts in self.parts.items()}
 
     @cached_property
-    def vector(self) -> np.ndarray:
+    def vector(self) -> KitVector:
         """(n_p,) all parameters; see the class for their order."""
         return np.concatenate([parts.ravel() for parts in self.parts.values()] or [np.empty(0)])
 
@@ -62,7 +63,7 @@ class Kit:
         starts = np.cumsum([0] + [parts.size for parts in self.parts.values()])
         return dict(zip(self.parts, starts.tolist()))
 
-    def with_vector(self, p: np.ndarray) -> Kit:
+    def with_vector(self, p: KitVector) -> Kit:
         """The kit with other parameters p (n_p,)."""
         p = np.asarray(p, dtype=float)
         return Kit(
@@ -73,7 +74,7 @@ class Kit:
             self.units,
         )
 
-    def bounds(self, bounds: Mapping[str, tuple] | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def bounds(self, bounds: Mapping[str, tuple] | None = None) -> tuple[KitVector, KitVector]:
         """(n_p,), (n_p,): bounds of `vector`, natural ones narrowed by the user's (kind -> lower,
         upper)."""
         pairs = [(part_kind(name).bounds(bounds), len(parts)) for name, parts in self.parts.items()]
@@ -148,8 +149,8 @@ class Assignment:
     """
 
     groups: tuple[ElementGroup, ...]
-    part: tuple[np.ndarray, ...]
-    variant: tuple[np.ndarray, ...]
+    part: tuple[Indices, ...]
+    variant: tuple[Indices, ...]
     n_q: int = field(default=0)
 
     def __repr__(self) -> str:
@@ -166,7 +167,7 @@ class Assignment:
             kit, [_end(variants, variant, upper) for _, _, variants, variant in self._filled()]
         )
 
-    def contact(self, q: np.ndarray, kit: Kit) -> tuple[sp.csr_array, np.ndarray]:
+    def contact(self, q: Parameters, kit: Kit) -> tuple[sp.csr_array, ParameterFlags]:
         """M (n_q, n_p) and active (n_q,) bool: the elements q differ by q - M p where active,
         elsewhere not at all.
 
@@ -180,7 +181,7 @@ class Assignment:
             blocks.append(rows)
         return self._rows(kit, blocks), active
 
-    def realise(self, kit: Kit, q: np.ndarray) -> np.ndarray:
+    def realise(self, kit: Kit, q: Parameters) -> Parameters:
         """(n_q,) the elements nearest to q that the assigned parts realise; entries outside the
         groups as in q."""
         matrix, active = self.contact(q, kit)
@@ -191,7 +192,7 @@ class Assignment:
         pairs = zip(self.part, other.part, self.variant, other.variant)
         return sum(int(np.count_nonzero((a != b) | (v != w))) for a, b, v, w in pairs)
 
-    def pieces(self, kit: Kit) -> dict[str, np.ndarray]:
+    def pieces(self, kit: Kit) -> dict[str, Indices]:
         """kind -> (m,) how many elements each part realises."""
         counts = {name: np.zeros(m, dtype=int) for name, m in kit.sizes.items()}
         for group, part, _, _ in self._filled():

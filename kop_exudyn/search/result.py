@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Indices
 from ..errors import SimulationFailure
 from ..kit.optimality import ClusteringGap
 from ..kit.parts import Assignment, Kit
@@ -91,7 +92,7 @@ class KitResult:
     def assignment(self) -> Assignment:
         return self.stages["assigned"].assignment
 
-    def pieces(self) -> list[dict[str, np.ndarray]]:
+    def pieces(self) -> list[dict[str, Indices]]:
         """By design: kind -> (m,) how many elements each part realises."""
         found, first = [], 0
         for design in self.designs:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
+from ..arrays import Indices, Parameters, Points, Triangles, Vector
 from ..errors import InputError, did_you_mean
 from ..kit.groups import ElementGroup
 from ..plugins import Registry
@@ -46,9 +47,9 @@ class Target:
     size : of the surface, l0, to which percentages refer: see `geometry.extent.size_of_points`
     """
 
-    vertices: np.ndarray
-    faces: np.ndarray
-    positions: np.ndarray
+    vertices: Points
+    faces: Triangles
+    positions: Points
     size: float
 
 
@@ -102,17 +103,17 @@ class Design(ABC):
     units: Units | None = None
     # (3,) where the scenes' coordinates begin in those of the design's own file: zero, unless it
     # lies far from the origin (see `geometry.centring`).
-    middle: np.ndarray = np.zeros(3)
+    middle: Vector = np.zeros(3)
     # (3,) where they begin in those of its user's other files.
     # Numbers here stay small; what is written for other programs has it added.
-    origin: np.ndarray = np.zeros(3)
+    origin: Vector = np.zeros(3)
     name: str
-    parameters: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
+    parameters: Parameters
+    lower: Parameters
+    upper: Parameters
     groups: list[ElementGroup]
     roles: tuple[Role, ...]
-    joints: np.ndarray
+    joints: Indices
 
     def __repr__(self) -> str:
         unit = "" if self.units is None else f", in {self.units.length}"
@@ -124,7 +125,7 @@ class Design(ABC):
 
     @abstractmethod
     def deploy(
-        self, q: np.ndarray | None = None, solve: Solve | None = None
+        self, q: Parameters | None = None, solve: Solve | None = None
     ) -> dict[str, Equilibrium]:
         """Equilibria of all roles from the design's own starting geometry (no warm start), at q
         (default: the input).
@@ -145,7 +146,7 @@ class Design(ABC):
         """The target; may need simulations of the input design, so it is computed at first use and
         kept."""
 
-    def report_positions(self, state: State) -> np.ndarray:
+    def report_positions(self, state: State) -> Points:
         """Joint positions (n, 3) in the order, the units and the place of the design's own
         file."""
         return self.middle + state.positions[self.joints]
@@ -178,13 +179,13 @@ class Design(ABC):
         """The way from the assembly to the deployed state; None for what is assembled in place."""
         return None
 
-    def assembled(self, q: np.ndarray, equilibria: Mapping[str, Equilibrium]) -> Start:
+    def assembled(self, q: Parameters, equilibria: Mapping[str, Equilibrium]) -> Start:
         """Where the way begins, for parameters q; equilibria of other roles than the fitted one are
         known already."""
         raise NotImplementedError(f"{self.class_name} designs are assembled in place")
 
     def opened_through(
-        self, q: np.ndarray, equilibria: Mapping[str, Equilibrium]
+        self, q: Parameters, equilibria: Mapping[str, Equilibrium]
     ) -> list[Equilibrium]:
         """The states that a builder opens the design through, in order, the deployed one last;
         none of what is assembled in place.
@@ -197,7 +198,7 @@ class Design(ABC):
         return self.way.opened(self.systems, q, self.assembled(q, equilibria))
 
     @property
-    def free(self) -> np.ndarray:
+    def free(self) -> Indices:
         """(k,) parameters that belong to no element, such as places of supports: no part has to
         realise them."""
         used = [group.indices.ravel() for group in self.groups]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Indices, Numbers, Points, Vector
 from ..checks import check_positive
 from ..errors import InputError
 
@@ -17,7 +18,7 @@ _SPREAD = ("gravity", "line", "area", "plan")  # loads of three numbers, or None
 _OUTSIDE = 3.0  # median edges: longer triangles span what is outside of a design
 
 
-def hold_in_place(points: np.ndarray) -> bool:
+def hold_in_place(points: Points) -> bool:
     """Whether a structure that is held at points (k, 3) can't turn: three or more, not on one
     line."""
     if len(points) < 3:
@@ -50,7 +51,7 @@ class DeflectionLimit:
         return float(min(own, np.inf if self.span_over is None else span / self.span_over))
 
 
-def tributary_areas(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def tributary_areas(points: Points) -> tuple[Numbers, Numbers]:
     """The areas of a surface that its joints (n, 3) carry: (n,) on the surface, (n,) in plan.
 
     Each has a third of every triangle of the joints' Delaunay triangulation in the plane that they
@@ -106,16 +107,16 @@ class LoadCase:
     deflection : how far the design may move under them
     """
 
-    gravity: np.ndarray | None = None
-    joints: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
-    forces: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
-    supports: np.ndarray | None = None
+    gravity: Vector | None = None
+    joints: Indices = field(default_factory=lambda: np.zeros(0, int))
+    forces: Points = field(default_factory=lambda: np.zeros((0, 3)))
+    supports: Indices | None = None
     name: str = "loads"
     factor: float = 1.0
     deflection: DeflectionLimit = DeflectionLimit()
-    line: np.ndarray | None = None
-    area: np.ndarray | None = None
-    plan: np.ndarray | None = None
+    line: Vector | None = None
+    area: Vector | None = None
+    plan: Vector | None = None
 
     def __post_init__(self) -> None:
         for name, kind in (
@@ -187,7 +188,7 @@ class LoadCase:
             **spread,
         )
 
-    def on_joints(self, surface: np.ndarray, plan: np.ndarray) -> np.ndarray | None:
+    def on_joints(self, surface: Numbers, plan: Numbers) -> Points | None:
         """(n, 3) forces on all joints of what is given per area, for their areas (n,); None where
         nothing is."""
         if self.area is None and self.plan is None:
