@@ -55,6 +55,7 @@ def run(args: argparse.Namespace) -> int:
     from ..analysis.input_check import check_designs
     from ..errors import InputError
     from ..io.studies import load_study
+    from ..structures.serving import served_by
     from .optimize import singular
 
     if (args.harmonise is None) != (args.out is None):
@@ -71,12 +72,12 @@ def run(args: argparse.Namespace) -> int:
                 value=f"{low:g},{high:g}",
             )
     study = load_study(args.folder, args.designs)
-    designs = study.designs()
+    given = {singular(k): n for k, n in {**study.parts, **(args.parts or {})}.items()}
+    designs = served_by(study.designs(), given)
     counts: dict[str, int] = {}
     for design in designs:
         for group in design.groups:
             counts[group.kind] = counts.get(group.kind, 0) + len(group.indices)
-    given = {singular(k): n for k, n in {**study.parts, **(args.parts or {})}.items()}
     parts = {
         kind: given.get(kind, min(_DEFAULT_PARTS, count))
         for kind, count in sorted(counts.items())

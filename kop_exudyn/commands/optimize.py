@@ -38,7 +38,8 @@ EXAMPLES = """examples:
   kop optimize study.toml --out out/kit --seed 1
   kop optimize models/conformals --designs 06_moebius --kit out/kit/kit.json --out out/another
   kop optimize models/conformals --designs 5 --max-deviation 1.5 --out out/smallest
-  kop optimize models/conformals --designs 3 --stock store.csv --out out/from_stock"""
+  kop optimize models/conformals --designs 3 --stock store.csv --out out/from_stock
+  kop optimize models/small --parts slit=4,angular=3 --out out/slits"""
 
 
 _FIRST_PARTS = 8  # of a kind, where a search for the smallest kit begins
@@ -50,7 +51,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--parts",
         type=part_counts,
         metavar="KIND=N,...",
-        help="how many parts of each kind, as linear=12,angular=5 (default: what the study says)",
+        help="how many parts of each kind, as linear=12,angular=5 (default: what the study says); "
+        "slit=6 instead of linear: beams with slits in place of their bolt holes, which realise an "
+        "interval of lengths",
     )
     parser.add_argument(
         "--kit",
@@ -119,6 +122,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="W",
         help="fewer pieces to make, where the designs are built one after the other: for 1 %% less "
         "of them the objective may rise by W %% (default: 0)",
+    )
+    parser.add_argument(
+        "--slit-cost",
+        type=positive_number,
+        metavar="W",
+        help="of slit parts: the dearer, the shorter their slits; slits of a tenth of the median "
+        "length count like joints 0.07 %% times the root of W / 1e-4 away from the target "
+        "(default: 1e-3)",
     )
     parser.add_argument(
         "--published",
@@ -278,9 +289,10 @@ def _smallest(args: argparse.Namespace, study: Study, parts: dict[str, int]) -> 
     from ..analysis.sizes import KitCost
     from ..report.environment import usable_cores
     from ..report.sizes_run import smallest_and_report
+    from ..structures.serving import served_by
 
     study = replace(_as_asked(args, study), baselines=False)
-    designs = study.designs()
+    designs = served_by(study.designs(), parts)
     counts: dict[str, int] = {}
     for design in designs:
         for group in design.groups:
@@ -329,6 +341,7 @@ def _given(args: argparse.Namespace) -> dict[str, Any]:
         "seed": args.seed,
         "leaps": args.leaps,
         "reuse": args.reuse,
+        "slit_cost": args.slit_cost,
         "redeployments": args.redeployments,
         **steps,
     }

@@ -64,7 +64,7 @@ class Strip:
     sides : along the axis from the joint to the corner points of side 1 and side 2; the longest
         ones, where the part adapts
     slide : by how much shorter either side may be built in; its bolt holes are as much longer
-    setback : by which either end is sawn off before its corner point
+    setback : by which either end is sawn off before its corner point, at the side's full length
     bolts : distances of bolts from their corner point
     slot : width of the slot at the joint, or None for a hole
     hole, bolt_hole : diameters
@@ -197,7 +197,10 @@ class Blanks:
         if not (self.options.corners and len(angles) and len(sides)):
             return Corners()
         d, breadth = self.options.bolt_hole, self.board.breadth
-        setback = setback_of(breadth, float(angles.max()))
+        # where strips are built in shorter than they can be, they must not meet at their corner
+        slides = [float(v[2]) for k, _, _, v, _ in self._needed() if has_joint(k) and len(v) > 2]
+        setback = setback_of(breadth, float(angles.max())) 
+        setback += self.scale * max(slides, default=0.0)
         leg = min(_LEG * breadth, _LEG_SHARE * float(sides.min()))
         # where that is too long for the shortest side, `problems` says so
         leg = max(leg, setback + (2 * _EDGE + _APART) * d)

@@ -175,11 +175,19 @@ def parts_list_of(result: KitResult) -> PartsList:
     The deployed states lie where their joints fit the target best. The input design's states stand
     in where no equilibrium of the assigned design was found.
     """
-    parts = parts_list(result.kit, result.assignment, result.designs)
     found = [
         outcome if isinstance(outcome, Evaluation) else reference
         for outcome, reference in zip(result.stages["assigned"].designs, result.references)
     ]
+    q = [
+        each.q if isinstance(each, Evaluation) else design.parameters
+        for design, each in zip(result.designs, found)
+    ]
+    realised = result.assignment.realise(result.kit, np.concatenate(q))
+    offsets = np.cumsum([0, *(len(one) for one in q)])
+    parts = parts_list(
+        result.kit, result.assignment, result.designs, np.split(realised, offsets[1:-1])
+    )
     states = []
     for design, each in zip(result.designs, found):
         of_roles = {role: eq.state for role, eq in each.equilibria.items()}

@@ -44,7 +44,7 @@ def strip_template(strip: Strip) -> Template:
                 )
             )
         )
-    shapes += [_slide(x, strip, joint) for x in strip.bolt_stations]
+    shapes += _bolt_holes(strip, joint)
     shapes.append(Polyline(np.array([[0.0, 0.0], [length, 0.0]]), False, ENGRAVE))
     height = min(0.3 * strip.board.breadth, 0.2 * strip.sides[0])
     # the label below the axis at the joint, "1" on side 1 just beyond what a corner plate covers
@@ -57,15 +57,28 @@ def strip_template(strip: Strip) -> Template:
     return Template(strip.label, name, strip.count, tuple(shapes), strip.board.thickness)
 
 
-def _slide(x: float, strip: Strip, joint: float) -> Shape:
-    """A bolt's hole; of a strip that adapts, a slot from there towards the joint."""
+def _bolt_holes(strip: Strip, joint: float) -> list[Shape]:
+    """The bolts' holes; of a strip that adapts, slots from there towards the joint, one where two
+    would leave less than a hole's diameter between them."""
     if not strip.slide:
-        return Hole(np.array([x, 0.0]), strip.bolt_hole)
-    radius = strip.bolt_hole / 2
-    other = x + (strip.slide if x < joint else -strip.slide)
+        return [Hole(np.array([x, 0.0]), strip.bolt_hole) for x in strip.bolt_stations]
+    spans: list[list[float]] = []
+    for x in strip.bolt_stations:
+        start, end = sorted((x, x + (strip.slide if x < joint else -strip.slide)))
+        same_side = spans and (spans[-1][1] < joint) == (end < joint)
+        if same_side and start < spans[-1][1] + 2 * strip.bolt_hole:
+            spans[-1][1] = max(spans[-1][1], end)
+        else:
+            spans.append([start, end])
+    return [_long_hole(start, end, strip.bolt_hole) for start, end in spans]
+
+
+def _long_hole(start: float, end: float, width: float) -> Polyline:
+    """A hole that a bolt slides in between two places on the axis."""
+    radius = width / 2
     turns = np.linspace(-np.pi / 2, np.pi / 2, _ARC + 1)
-    right = np.stack([max(x, other) + radius * np.cos(turns), radius * np.sin(turns)], axis=1)
-    left = np.stack([min(x, other) - radius * np.cos(turns), -radius * np.sin(turns)], axis=1)
+    right = np.stack([end + radius * np.cos(turns), radius * np.sin(turns)], axis=1)
+    left = np.stack([start - radius * np.cos(turns), -radius * np.sin(turns)], axis=1)
     return Polyline(np.concatenate([right, left]))
 
 

@@ -22,6 +22,7 @@ from ..search.objective import DesignObjective, Evaluation, Reference, Weights, 
 from ..search.result import INPUT, REDEPLOYED, STAGES, KitResult
 from ..search.stage_results import Jump, StageResult
 from ..structures.base import Design, Role
+from ..structures.serving import served_by
 from .results import load_result, load_states
 
 _LAST = "assigned"
@@ -48,6 +49,7 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
     data, states = load_result(path), load_states(folder / "states.npz")
     designs = _named(designs, [design["name"] for design in data["designs"]], path)
     kit = Kit.from_dict(data["kit"], source=str(path))
+    designs = served_by(designs, kit.sizes)
     offsets = np.cumsum([0, *(len(design.parameters) for design in designs)])
     groups = [
         group.shifted(start) for design, start in zip(designs, offsets) for group in design.groups
@@ -55,7 +57,8 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
     assignment = Assignment.from_dict(
         data["assignment"], groups, int(offsets[-1]), kit, source=str(path)
     )
-    realised = np.split(assignment.matrix(kit) @ kit.vector, offsets[1:-1])
+    inputs = np.concatenate([design.parameters for design in designs])
+    realised = np.split(assignment.realise(kit, inputs), offsets[1:-1])
     references = [_reference(design, states) for design in designs]
     try:
         weights = _weights(data["settings"], designs)

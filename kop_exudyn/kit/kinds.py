@@ -106,6 +106,10 @@ class PartKind:
     angular : whether the parameters are angles (scale 1) or lengths (scale: the inputs' median)
     penalty : (k_p,) weights of 1/2 (p / scale)^2, averaged over the kind's parts, in the projection
         energy
+    limits : (r, k_p) A: every part has A p <= 0. A row has one positive entry, and that in a
+        parameter which may be lowered to 0
+    serves : another kind whose elements these parts are made for as well, where a kit has none of
+        that kind
     """
 
     name: str
@@ -116,6 +120,8 @@ class PartKind:
     upper: np.ndarray
     angular: bool = False
     penalty: np.ndarray | None = None
+    limits: np.ndarray | None = None
+    serves: str | None = None
 
     @property
     def n_parameters(self) -> int:
@@ -132,6 +138,20 @@ class PartKind:
                 value=n_parameters,
             )
         return self.variants[n_parameters]
+
+    @property
+    def realises_intervals(self) -> bool:
+        """Whether an element of such a part may have more than one value."""
+        return any(variants.reach is not None for variants in self.variants.values())
+
+    def limited(self, parts: np.ndarray) -> np.ndarray:
+        """(m, k_p) parts of which no more is taken than their limits allow."""
+        found = np.array(parts, dtype=float)
+        for row in () if self.limits is None else self.limits:
+            at = int(row.argmax())
+            most = -(found @ row - found[:, at] * row[at]) / row[at]
+            found[:, at] = np.minimum(found[:, at], np.maximum(most, 0.0))
+        return found
 
     def scale(self, values: np.ndarray) -> float:
         """The length that makes this kind's distances dimensionless: median of the input elements'

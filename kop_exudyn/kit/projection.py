@@ -86,8 +86,9 @@ class Projection:
         scales = {name: elements.scale for name, elements in collect(groups, q).items()}
         return cls(tuple(groups), scales, weight, bounds, penalties)
 
-    def with_weight(self, weight: float) -> Projection:
-        return replace(self, weight=weight)
+    def with_weight(self, weight: float, penalties: Penalties | None = None) -> Projection:
+        """The same energy with another w_c, and other penalties where some are given."""
+        return replace(self, weight=weight, penalties=penalties or self.penalties)
 
     def minimise(self, q: np.ndarray, kit: Kit) -> ProjectionMinimum:
         """Best parts and assignment for q (n_q,), alternating from `kit`."""

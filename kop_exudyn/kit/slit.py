@@ -3,8 +3,12 @@ interval of lengths.
 
 The part (l1, l2, s) realises every length in [l1, l1 + s] on one side and in [l2, l2 + s] on the
 other. Without a cost slits would grow until one part served all, hence the penalty on s
-(`penalties` of the clustering and the projection sets another). Designs ask for these parts by
-giving their linear elements the kind "slit".
+(`penalties` of the clustering and the projection sets another). A kit that has slit parts and no
+linear ones makes the linear elements of them; designs may also ask for them by giving elements the
+kind "slit".
+
+A slit takes strength along its length as a bolt's hole does at its place, and stiffness that a
+rod of one section doesn't lose: it may be half as long as the side that is left of its piece.
 """
 
 from __future__ import annotations
@@ -14,6 +18,7 @@ import numpy as np
 from .kinds import PartKind, Variants, register_kind
 
 _SIDE_1, _SIDE_2, _SLIT = [1, 0, 0], [0, 1, 0], [0, 0, 1]
+_SHARE = 0.5  # of either side without its slit, at most
 
 
 def _sorted_sides(parts: np.ndarray) -> np.ndarray:
@@ -36,5 +41,7 @@ SLIT = register_kind(
         lower=np.zeros(3),
         upper=np.full(3, np.inf),
         penalty=np.array([0.0, 0.0, 0.05]),
+        limits=np.array([[-_SHARE, 0.0, 1.0], [0.0, -_SHARE, 1.0]]),
+        serves="linear",
     )
 )

@@ -21,9 +21,10 @@ from ..kit.stock import Stock
 from ..search.events import StageEvent
 from ..search.pool import DesignPool
 from ..search.result import KitResult
-from ..search.run import check_request, described_job, digest, optimize_kit
+from ..search.run import check_request, described_job, digest, kinds_of, optimize_kit
 from ..search.settings import JobSettings
 from ..structures.base import Design
+from ..structures.serving import served_by
 from .kit_report import write_kit_report
 from .verdicts import give_verdicts, given_verdicts, warning_lines
 
@@ -67,6 +68,7 @@ def optimize_and_report(
     SimulationFailure
         when an input design can't be simulated
     """
+    designs = served_by(designs, kinds_of(parts, kit))
     if kit is None:
         settings = within_workshop(designs, settings)
     check_request(designs, parts, kit, settings)

@@ -22,6 +22,7 @@ from ..search.result import KitResult
 from ..search.run import check_request, described_job, digest
 from ..search.settings import JobSettings
 from ..structures.base import Design
+from ..structures.serving import served_by
 from .environment import environment
 from .kit_report import write_kit_report
 from .kit_run import progress_bar, within_workshop
@@ -63,6 +64,7 @@ def smallest_and_report(
     Returns the kit and whether it keeps the limit; where none does, the one that deviates least.
     Raises InputError and SimulationFailure as `optimize_and_report`.
     """
+    designs = served_by(designs, first)
     settings = within_workshop(designs, settings)
     asked = {"max_deviation": limit, "cost": asdict(cost)}
     with _prepared(
@@ -124,6 +126,7 @@ def tradeoff_and_report(
 
     Raises InputError and SimulationFailure as `optimize_and_report`.
     """
+    designs = served_by(designs, sizes[-1])
     settings = within_workshop(designs, settings)
     asked = {"sizes": [dict(size) for size in sizes]}
     with _prepared(

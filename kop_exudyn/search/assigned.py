@@ -63,7 +63,7 @@ def assigned_stage(
     settings = stages.settings
     if settings.reassignments == 0:
         label = ASSIGNED if numbers is None else SQPLabel.of_round(next(numbers))
-        return stages.assigned(start, label) if stages.rule.parts_move else start
+        return stages.assigned(start, label) if stages.optimises else start
     rounds = _Rounds(stages, numbers or count(1), start.steps)
     best = rounds.alternated(start, settings.reassignments)
     leaps = settings.leaps if leaps is None else leaps
@@ -150,7 +150,7 @@ def forgiving_stage(
             found.append(_secured(stages, other, numbers))
             break
     steps = best.steps
-    for factor in _CALMER if stages.rule.parts_move else ():
+    for factor in _CALMER if stages.optimises else ():
         calmer = stages.calmer(factor)
         trial = calmer.assigned(calmer.weighed(best), SQPLabel.of_round(next(numbers)))
         steps += trial.steps
@@ -178,7 +178,7 @@ def _secured(stages: Stages, best: StageResult, numbers: Iterator[int]) -> Stage
     were where that gains nothing."""
     secured = stages.secured(forgiving=not stages.snapping(best))
     best = secured.kept(best)
-    if not stages.rule.parts_move or best.value is None:
+    if not stages.optimises or best.value is None:
         return best
     found = secured.assigned(best, SQPLabel.of_round(next(numbers)))
     opened = replace(found, designs=secured.redeployed(found))
@@ -204,7 +204,7 @@ class _Rounds:
         """Reassigned and optimised in so many rounds at most, as long as they gain."""
         for number in range(rounds):
             result = _many_reassigned(self.stages, best)
-            if result is best and (number > 0 or not self.stages.rule.parts_move):
+            if result is best and (number > 0 or not self.stages.optimises):
                 break
             result = self._optimised(result)
             last, best = best, min((best, result), key=_value)
@@ -232,7 +232,7 @@ class _Rounds:
     def _optimised(
         self, result: StageResult, max_steps: int | None = None, tolerance: float | None = None
     ) -> StageResult:
-        if not self.stages.rule.parts_move:
+        if not self.stages.optimises:
             return result
         settings = self.stages.settings
         result = self.stages.assigned(
@@ -382,7 +382,7 @@ def _trial(
         damping,
         ", same parts" if move_parts is keep_parts else "",
         _value(trial),
-        _value(best) + found.predicted.sum(),
+        _value(best) + found.total,
     )
     return trial, found, damping
 
@@ -404,7 +404,7 @@ def _misled(
     stages: Stages, best: StageResult, trial: StageResult, found: Reassignment
 ) -> list[int]:
     """The designs that the model was wrong about: those that ended far above what it promised."""
-    allowed = _MISLED * abs(found.predicted.sum())
+    allowed = _MISLED * abs(found.total)
     return [
         n
         for n, (old, new) in enumerate(zip(best.evaluations, trial.designs))

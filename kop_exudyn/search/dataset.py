@@ -114,10 +114,27 @@ class Dataset:
 
     @property
     def free(self) -> np.ndarray:
-        """(k,) places in the long vector that belong to no element, see `Design.free`."""
-        return np.concatenate(
-            [d.free + offset for d, offset in zip(self.designs, self.offsets)]
-        ).astype(int)
+        """(k,) places in the long vector whose values no part's are: those of no element, see
+        `Design.free`, and then those of `sliding`."""
+        own = [d.free + offset for d, offset in zip(self.designs, self.offsets)]
+        return np.concatenate([*own, self.sliding]).astype(int)
+
+    @property
+    def sliding(self) -> np.ndarray:
+        """(k,) places of elements whose parts realise intervals, increasing: they may take any
+        value within."""
+        return np.sort(
+            np.concatenate(
+                [
+                    np.empty(0, dtype=int),
+                    *(
+                        group.indices.ravel()
+                        for group in self.groups
+                        if part_kind(group.kind).realises_intervals
+                    ),
+                ]
+            )
+        )
 
     def split(self, q: np.ndarray) -> list[np.ndarray]:
         """The designs' own parts of the long vector."""
@@ -150,6 +167,12 @@ class Dataset:
             low, high = kind.bounds(bounds)
             if kind.angular:
                 low, high = -high, high
+            elif kind.realises_intervals and len(group.indices):
+                ways = kind.variants_of(group.indices.shape[1])
+                assert ways.reach is not None
+                low, high = (ways.matrices @ low).min(axis=0), _times(
+                    ways.matrices + ways.reach, high
+                ).max(axis=0)
             else:
                 # an element may be realised mirrored: each of its lengths must suit one side of a
                 # part
@@ -315,6 +338,11 @@ class Dataset:
     def penalty_of(self, evaluation: Evaluation) -> float:
         """What the excess of a design's bounds costs."""
         return self.penalty * penalty_of(np.array(list(evaluation.excess.values())))
+
+
+def _times(matrices: np.ndarray, limits: np.ndarray) -> np.ndarray:
+    """Matrices (..., k) of no negative entries times limits (k,), of which some are infinite."""
+    return np.where(matrices > 0, matrices * np.where(matrices > 0, limits, 0.0), 0.0).sum(axis=-1)
 
 
 def all_or_raise(results: Sequence[T | SimulationFailure]) -> list[T]:

@@ -21,6 +21,7 @@ from ..kit.kinds import has_joint, part_kind
 from ..kit.parts import Assignment
 from .reassign import LocalModel, best_parts
 from .settings import EFFORTS
+from .sliding import best_in_boxes
 from .stage_results import StageResult
 from .stages import Stages
 
@@ -113,7 +114,7 @@ def _neighbours(stages: Stages, best: StageResult, model: LocalModel) -> list[_N
         if vector is None:
             return None
         values = model.values(problem.dataset.split(changed.matrix @ vector))
-        return _Neighbour(assignment, vector, float(values.sum()))
+        return _Neighbour(assignment, vector, float(values.sum()) + changed.cost(vector))
 
     changes = _changes(best, model, stages)[:_SINGLES]
     singles = [(one, change) for change in changes if (one := judged([change])) is not None]
@@ -135,17 +136,20 @@ def _changes(best: StageResult, model: LocalModel, stages: Stages) -> list[_Chan
         if not len(group.indices):
             continue
         ways = part_kind(group.kind).variants_of(group.indices.shape[1])
-        if ways.reach is not None:
-            continue
         n = int(design_of[g])
         candidates = np.einsum("vek,mk->mve", ways.matrices, best.kit[group.kind])
         m, n_ways, k = candidates.shape
         candidates = candidates.reshape(-1, k)
+        if ways.reach is not None:
+            width = np.einsum("vek,mk->mve", ways.reach, best.kit[group.kind]).reshape(-1, k)
         chosen = best.assignment.part[g] * n_ways + best.assignment.variant[g]
         for e, own in enumerate(group.indices - offsets[n]):
             d = candidates - model.base[n][own]
             block = model.hessians[n][np.ix_(own, own)]
-            gains = d @ slopes[n][own] + 0.5 * np.einsum("ci,ij,cj->c", d, block, d)
+            if ways.reach is not None:
+                _, gains = best_in_boxes(d, d + width, slopes[n][own], block)
+            else:
+                gains = d @ slopes[n][own] + 0.5 * np.einsum("ci,ij,cj->c", d, block, d)
             found += [
                 (float(gains[c]), (g, e, c // n_ways, c % n_ways))
                 for c in range(m * n_ways)

@@ -84,6 +84,7 @@ class SoughtKit:
             bounds=settings.bounds,
             restarts=settings.restarts,
             seed=settings.seed,
+            penalties=projection.penalties,
         )
         return found.kit, found.assignment
 

@@ -127,14 +127,19 @@ def _judged(
 ) -> Reassignment | None:
     settings = stages.settings
     problem = AssignedProblem(
-        stages.dataset, kit, assignment, settings.bounds, settings.constraints
+        stages.dataset,
+        kit,
+        assignment,
+        settings.bounds,
+        settings.constraints,
+        costs=stages.costs,
     )
     return improved(problem, model)
 
 
 def _best(found: list[Reassignment | None]) -> Reassignment | None:
     there = [one for one in found if one is not None]
-    return min(there, key=lambda one: float(one.predicted.sum())) if there else None
+    return min(there, key=lambda one: one.total) if there else None
 
 
 def _with_copy(result: StageResult, kind: str) -> tuple[Kit, Assignment]:

@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..kit.kinds import Bounds
+from ..kit.part_costs import PartCosts
 from ..kit.parts import Assignment, Kit
 from ..kit.projection import Projection
 from ..kit.stock import Stock
@@ -18,6 +19,10 @@ from ..sqp.problem import Derivatives, Inequalities, Point
 from .dataset import Dataset
 from .kit_rule import KitRule, SoughtKit
 from .objective import DesignDerivatives, Evaluation
+from .sliding import limit_rows, stacked
+
+# of the mean curvature: what holds parts that act by their limits alone
+_HELD = 1e-4
 
 
 @dataclass(frozen=True)
@@ -120,13 +125,16 @@ class RelaxedProblem:
 
 
 class AssignedProblem:
-    """J(x) = sum F(M x) over x = (p, y): the parts p, every element being its part, and the
+    """J(x) = sum F(M x) + C(p) over x = (p, y): the parts p, every element being its part, and the
     parameters y of no element.
 
     The assignment is fixed. M (n_q, n_p + k) is the assignment's for the parts, and puts y in its
-    places.
+    places. The elements of parts that realise intervals are among y as well, and kept within their
+    parts by linear rows (see sliding.py).
     constraints : on the elements q = M p, as in `RelaxedProblem`
     stock : pieces of which the elements may be made; default: of each part as many as needed
+    costs : C, of the parts themselves
+    parts_move : False: only y are sought
     """
 
     def __init__(
@@ -137,15 +145,19 @@ class AssignedProblem:
         bounds: Bounds | None = None,
         constraints: LinearConstraints | None = None,
         stock: Stock | None = None,
+        costs: PartCosts = PartCosts(),
+        parts_move: bool = True,
     ):
         self.dataset, self.kit, self.assignment = dataset, kit, assignment
         self.part_bounds, self.of_elements, self.stock = bounds, constraints, stock
+        self.costs, self.parts_move = costs, parts_move
         self._free, self._n_parts = dataset.free, len(kit.vector)
+        self.sliding = dataset.sliding
         places = sp.csr_matrix(
             (np.ones(len(self._free)), (self._free, np.arange(len(self._free)))),
             shape=(assignment.n_q, len(self._free)),
         )
-        self.matrix = sp.csr_matrix(sp.hstack([assignment.matrix(kit), places]))
+        self.matrix = sp.csr_matrix(sp.hstack([self._fixed_rows(), places]))
         unlimited = np.full(len(self._free), np.inf)
         self.lower, self.upper = (
             np.append(side, sign * unlimited) for side, sign in zip(kit.bounds(bounds), (-1, 1))
@@ -157,17 +169,61 @@ class AssignedProblem:
             if constraints is not None
             else LinearConstraints.none(self.n)
         )
+        if len(self.sliding):
+            rows = limit_rows(
+                assignment, kit, self.sliding, self.n, parts_move, self.part_bounds
+            )
+            self.constraints = stacked(self.constraints, rows)
+            if not parts_move:
+                p = kit.vector
+                self.lower[: len(p)] = self.upper[: len(p)] = p
         self.scale = self._scale()
 
     def reassigned(self, assignment: Assignment) -> AssignedProblem:
         """The same problem with other parts for the elements."""
         return AssignedProblem(
-            self.dataset, self.kit, assignment, self.part_bounds, self.of_elements, self.stock
+            self.dataset,
+            self.kit,
+            assignment,
+            self.part_bounds,
+            self.of_elements,
+            self.stock,
+            self.costs,
+            self.parts_move,
         )
 
     def variables(self, q: np.ndarray) -> np.ndarray:
-        """x of the problem's kit, with the parameters of no element as they are in q (n_q,)."""
+        """x of the problem's kit, with the parameters of no element as they are in q (n_q,), and
+        those of elements in intervals as near to q as their parts allow."""
+        if len(self.sliding):
+            q = self.assignment.realise(self.kit, q)
         return np.append(self.kit.vector, q[self._free])
+
+    def moved(self, vector: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """x of the same parts as in `vector` (n_p + k,), the other variables as in q (n_q,)."""
+        return np.append(vector[: self._n_parts], q[self._free])
+
+    def cost(self, vector: np.ndarray) -> float:
+        """What the parts in x cost."""
+        return self.costs.value(self.kit_of(vector)) if self.costs.weights else 0.0
+
+    def with_costs(
+        self, vector: np.ndarray, gradient: np.ndarray, hessian: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Gradient (n,) and Hessian (n, n) of the designs' objective, with those of the parts'
+        costs, and a curvature for every variable."""
+        if self.costs.weights:
+            own, n = self.costs.curvature(self.kit), self._n_parts
+            gradient[:n] += own * vector[:n]
+            hessian[np.arange(n), np.arange(n)] += own
+        unused = np.flatnonzero(np.abs(hessian).sum(axis=1) == 0)
+        # parts that nothing uses stay where they are, those that elements slide in follow these
+        curvature = np.abs(hessian.diagonal()).mean()
+        touched = np.zeros(self.n, dtype=bool)
+        if len(self.sliding):
+            touched[np.unique(self.constraints.A.indices)] = True
+        hessian[unused, unused] = np.where(touched[unused], _HELD, 1.0) * curvature
+        return gradient, hessian
 
     def kit_of(self, x: np.ndarray) -> Kit:
         """The parts in x."""
@@ -186,8 +242,13 @@ class AssignedProblem:
     def point(self, x: np.ndarray, evaluations: list[Evaluation]) -> Point:
         """The point of given evaluations."""
         terms = _sum_terms(self.dataset, evaluations)
-        data = DatasetPoint(evaluations, self.kit_of(x), self.assignment, terms, evaluations)
-        return Point(x, self.dataset.value(evaluations), data, _excess(evaluations))
+        kit = self.kit_of(x)
+        value = self.dataset.value(evaluations)
+        if self.costs.weights:
+            terms["part cost"] = self.costs.value(kit)
+            value += terms["part cost"]
+        data = DatasetPoint(evaluations, kit, self.assignment, terms, evaluations)
+        return Point(x, value, data, _excess(evaluations))
 
     def completed(self, point: Point, previous: Point) -> Point:
         """As in `RelaxedProblem`."""
@@ -206,9 +267,7 @@ class AssignedProblem:
             rows = self.matrix[start:end]
             gradient += weight * (rows.T @ d.gradient)
             hessian += weight * (rows.T @ (rows.T @ d.model.T).T)
-        unused = np.flatnonzero(np.abs(hessian).sum(axis=1) == 0)
-        # parts that nothing uses stay where they are
-        hessian[unused, unused] = np.abs(hessian.diagonal()).mean()
+        gradient, hessian = self.with_costs(point.x, gradient, hessian)
         return Derivatives(gradient, sp.csc_matrix(hessian), inequalities=bounds, point=refined)
 
     def first_derivatives(self, point: Point) -> Derivatives:
@@ -220,7 +279,22 @@ class AssignedProblem:
         weighted = np.concatenate(
             [w * d.gradient for w, d in zip(self.dataset.design_weights, designs)]
         )
-        return Derivatives(self.matrix.T @ weighted, inequalities=bounds, point=refined)
+        gradient = self.matrix.T @ weighted
+        if self.costs.weights:
+            p = data.kit.vector
+            gradient[: len(p)] += self.costs.curvature(self.kit) * p
+        return Derivatives(gradient, inequalities=bounds, point=refined)
+
+    def _fixed_rows(self) -> sp.csr_array:
+        """(n_q, n_p) the elements that are their parts, without those that slide in them."""
+        matrix = self.assignment.matrix(self.kit)
+        if not len(self.sliding):
+            return matrix
+        kept = np.ones(self.assignment.n_q)
+        kept[self.sliding] = 0.0
+        found = sp.csr_array(sp.dia_array((kept[None], [0]), shape=(len(kept),) * 2) @ matrix)
+        found.eliminate_zeros()
+        return found
 
     def _limit_by_designs(self) -> None:
         """An element's own bounds are its part's: entries of M are +-1, one a row."""
@@ -235,7 +309,11 @@ class AssignedProblem:
         """A part's scale is that of the elements it serves."""
         scale = np.zeros(self.n)
         rows = self.matrix.tocoo()
-        np.maximum.at(scale, rows.col, self.dataset.scales()[rows.row])
+        scales = self.dataset.scales()
+        np.maximum.at(scale, rows.col, scales[rows.row])
+        if len(self.sliding):
+            upper = self.assignment.matrix(self.kit, upper=True).tocoo()
+            np.maximum.at(scale, upper.col, scales[upper.row])
         return np.where(scale > 0, scale, 1.0)
 
 

@@ -20,15 +20,17 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..compiled.library import address, library
-from ..kit.kinds import part_kind
+from ..kit.kinds import Variants, part_kind
 from ..kit.parts import Assignment, Kit
 from ..kit.reuse import PieceCount
 from ..sqp.qp import QP, QPSolver
 from .objective import DesignDerivatives
 from .problems import AssignedProblem
+from .sliding import best_in_boxes
 
 _SETTLED = 1e-6  # rounds that gain less than this share of the gain so far are the last
 _ROUNDS = 50
+_BOX_SWEEPS = 20  # over elements that slide, before the parts are moved
 
 
 @dataclass(frozen=True)
@@ -94,13 +96,19 @@ MoveParts = Callable[["AssignedProblem", np.ndarray, LocalModel], "np.ndarray | 
 @dataclass(frozen=True)
 class Reassignment:
     """Another kit and assignment, the parameters of no element to go with them (k,), what the model
-    promises of them by design, and how many elements changed."""
+    promises of them by design, how many elements changed, and by how much the parts cost more."""
 
     kit: Kit
     assignment: Assignment
     free: np.ndarray
     predicted: np.ndarray
     changes: int
+    cost: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """By how much J should change."""
+        return float(self.predicted.sum() + self.cost)
 
 
 def reassign(
@@ -115,8 +123,8 @@ def reassign(
     move_parts : `best_parts` (the default) moves the parts along, `keep_parts` leaves them
 
     Where the problem has a stock, no more pieces are used than there are: elements take what is
-    left, and exchange what they have. Elements of kinds that realise intervals keep their parts
-    too. Where pieces cost, what is lowered is the model with the cost of the pieces to be made.
+    left, and exchange what they have; elements of kinds that realise intervals keep their parts
+    then. Otherwise these get the part in which they have the best place. Where pieces cost, what is lowered is the model with the cost of the pieces to be made.
     Returns None where no element gains by another part, or the constraints can't be met with
     what it would get.
     """
@@ -135,11 +143,14 @@ def improved(
     move_parts = move_parts or best_parts
     before, vector = problem.assignment, problem.variables(np.concatenate(model.base))
     start = value = _cost(problem, vector, model)
+    paid = problem.cost(vector)
     current = problem
     for _ in range(_ROUNDS):
-        changed = _sweep(current, vector, model, frozen)
+        changed, places = _sweep(current, vector, model, frozen)
         if changed is not None:
             current = problem.reassigned(changed)
+            if len(current.sliding):
+                vector = current.moved(vector, places)
         moved = move_parts(current, vector, model)
         if moved is None:
             return None
@@ -150,13 +161,19 @@ def improved(
     changes = current.assignment.changes(before)
     predicted = model.values(problem.dataset.split(current.matrix @ vector))
     return Reassignment(
-        problem.kit_of(vector), current.assignment, problem.free_of(vector), predicted, changes
+        problem.kit_of(vector),
+        current.assignment,
+        problem.free_of(vector),
+        predicted,
+        changes,
+        current.cost(vector) - paid,
     )
 
 
 def _cost(problem: AssignedProblem, vector: np.ndarray, model: LocalModel) -> float:
     """The model's value, with the cost of pieces where they have one."""
     value = float(model.values(problem.dataset.split(problem.matrix @ vector)).sum())
+    value += problem.cost(vector)
     if model.piece_cost:
         count = PieceCount(problem.kit, problem.assignment, problem.dataset.group_designs)
         value += model.piece_cost * count.fabricated
@@ -165,9 +182,9 @@ def _cost(problem: AssignedProblem, vector: np.ndarray, model: LocalModel) -> fl
 
 def _sweep(
     problem: AssignedProblem, vector: np.ndarray, model: LocalModel, frozen: Sequence[int]
-) -> Assignment | None:
-    """Give every element its best part, the parts staying as they are; None when all have
-    theirs."""
+) -> tuple[Assignment | None, np.ndarray]:
+    """Give every element its best part, the parts staying as they are; None when all have theirs.
+    And the elements (n_q,)."""
     dataset, kit = problem.dataset, problem.kit_of(vector)
     q = [part.copy() for part in dataset.split(problem.matrix @ vector)]
     slopes = model.slopes(q)
@@ -185,6 +202,18 @@ def _sweep(
             continue
         ways = part_kind(group.kind).variants_of(group.indices.shape[1])
         if ways.reach is not None:
+            if stock is None:
+                parts[number], variants[number], moved = _descend_in_boxes(
+                    (q[n], slopes[n], model.hessians[n]),
+                    group.indices - offsets[n],
+                    (ways, kit[group.kind]),
+                    parts[number] * len(ways.names) + variants[number],
+                    model,
+                    count,
+                    group.kind,
+                    int(n),
+                )
+                changes += moved
             continue
         candidates = np.einsum("vek,mk->mve", ways.matrices, kit[group.kind])
         n_ways = len(ways.names)
@@ -208,10 +237,64 @@ def _sweep(
             changes += 1 + _descend(*state, left)
         parts[number], variants[number] = choice // n_ways, choice % n_ways
     if not changes:
-        return None
+        return None, np.concatenate(q)
     return Assignment(
         problem.assignment.groups, tuple(parts), tuple(variants), problem.assignment.n_q
+    ), np.concatenate(q)
+
+
+def _descend_in_boxes(
+    state: tuple[np.ndarray, np.ndarray, np.ndarray],
+    indices: np.ndarray,
+    parts: tuple[Variants, np.ndarray],
+    choice: np.ndarray,
+    model: LocalModel,
+    count: PieceCount | None,
+    kind: str,
+    design: int,
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """As `_descend` and `_descend_counted` without a stock, for elements that slide in their parts:
+    each is given the part in which its best place is best, and moved there.
+
+    state : q, slope and hessian of the design, the first two brought up to date
+    indices : (n, k_e) of the elements in q;  parts : the variants, and the parts (m, k_p)
+    choice : (n,) part times the number of variants, plus the variant
+
+    Returns parts and variants (n,), and how many changed.
+    """
+    q, slope, hessian = state
+    ways, values = parts
+    n_ways = len(ways.names)
+    assert ways.reach is not None
+    low, high = (
+        np.einsum("vek,mk->mve", maps, values).reshape(-1, indices.shape[1])
+        for maps in (ways.matrices, ways.matrices + ways.reach)
     )
+    total, choice = 0, choice.copy()
+    for _ in range(_BOX_SWEEPS):
+        changed = 0
+        for e, own in enumerate(indices):
+            steps, gains = best_in_boxes(
+                low - q[own], high - q[own], slope[own], hessian[np.ix_(own, own)]
+            )
+            mine = int(choice[e]) // n_ways
+            if count is not None:
+                gains += model.piece_cost * np.repeat(count.changes(kind, design, mine), n_ways)
+            which = int(np.argmin(gains))
+            if gains[which] >= gains[choice[e]] - model.rounding:
+                which = int(choice[e])
+            if gains[which] < -model.rounding or which != choice[e]:
+                slope += steps[which] @ hessian[own]
+                q[own] += steps[which]
+            if which != choice[e]:
+                if count is not None:
+                    count.move(kind, design, mine, which // n_ways)
+                choice[e] = which
+                changed += 1
+        total += changed
+        if not changed:
+            break
+    return choice // n_ways, choice % n_ways, total
 
 
 def _descend(
@@ -368,10 +451,13 @@ def _exchange(
 
 
 def best_parts(
-    problem: AssignedProblem, vector: np.ndarray, model: LocalModel
+    problem: AssignedProblem, vector: np.ndarray, model: LocalModel, keep: bool = False
 ) -> np.ndarray | None:
-    """(n_p + k,) the variables that minimise m(M x) within bounds and constraints; None where these
-    can't be met."""
+    """(n_p + k,) the variables that minimise m(M x) and the parts' costs within bounds and
+    constraints; None where these can't be met.
+
+    keep : the parts stay as they are
+    """
     rows = [
         problem.matrix[a:b] for a, b in zip(problem.dataset.offsets, problem.dataset.offsets[1:])
     ]
@@ -379,9 +465,13 @@ def best_parts(
     gradient = sum(m.T @ s for m, s in zip(rows, slopes))
     hessian = sum(m.T @ (m.T @ h).T for m, h in zip(rows, model.hessians))
     hessian = 0.5 * (hessian + hessian.T)
-    unused = np.flatnonzero(np.abs(hessian).sum(axis=1) == 0)
-    hessian[unused, unused] = np.abs(hessian.diagonal()).mean()
+    gradient, hessian = problem.with_costs(vector, gradient, hessian)
     limits, now = problem.constraints, problem.constraints.A @ vector
+    lower, upper = problem.lower, problem.upper
+    if keep:
+        lower, upper = lower.copy(), upper.copy()
+        of_parts = slice(len(problem.kit.vector))
+        lower[of_parts] = upper[of_parts] = vector[of_parts]
     result = QPSolver().solve(
         QP(
             sp.csc_matrix(hessian),
@@ -389,15 +479,18 @@ def best_parts(
             limits.A,
             limits.lower - now,
             limits.upper - now,
-            problem.lower - vector,
-            problem.upper - vector,
+            lower - vector,
+            upper - vector,
         )
     )
     if result.status != "solved":
         return None if limits.rows else vector  # an indefinite model: the parts stay
-    return np.clip(vector + result.x, problem.lower, problem.upper)
+    return np.clip(vector + result.x, lower, upper)
 
 
-def keep_parts(problem: AssignedProblem, vector: np.ndarray, model: LocalModel) -> np.ndarray:
-    """(n_p + k,) the variables as they are."""
-    return vector
+def keep_parts(
+    problem: AssignedProblem, vector: np.ndarray, model: LocalModel
+) -> np.ndarray | None:
+    """(n_p + k,) the variables as they are, but for the places of elements that slide in their
+    parts."""
+    return best_parts(problem, vector, model, keep=True) if len(problem.sliding) else vector

@@ -14,10 +14,12 @@ import scipy.sparse as sp
 
 from ..errors import InputError
 from ..kit.cluster import cluster
+from ..kit.kinds import part_kind
 from ..kit.optimality import clustering_gaps
 from ..kit.parts import Kit
 from ..kit.stock import Missing, Stock
 from ..structures.base import Design
+from ..structures.serving import served_by
 from ..units import common_units, unnamed_units
 from .assigned import opened_stage
 from .dataset import Dataset
@@ -53,7 +55,8 @@ def optimize_kit(
     Parameters
     ----------
     designs : what is to be built
-    parts : kind -> number of parts of the kit that is sought
+    parts : kind -> number of parts of the kit that is sought; with "slit" in place of "linear",
+        linear elements are made of slit parts (see `served_by`)
     kit : instead of `parts`: a kit whose parts stay as they are, or a stock of them, of which no
         more pieces are used than there are
     start : by design, elements (nq,) that a neighbouring kit realises, in place of the direct
@@ -74,6 +77,7 @@ def optimize_kit(
         when an input design can't be simulated
     """
     begin = perf_counter()
+    designs = served_by(designs, kinds_of(parts, kit))
     check_request(designs, parts, kit, settings)
     if kit is not None:
         given = kit.kit.units if isinstance(kit, Stock) else kit.units
@@ -144,6 +148,7 @@ def optimize_kit(
                 dataset.parameters,
                 found["direct"].kit,
                 bounds=settings.stages.bounds,
+                penalties=stages.projection.penalties,
             )
         result.peak_memory_mb = pool.peak_memory_mb()
     result.equilibria = dataset.tally.equilibria
@@ -161,6 +166,12 @@ def _confirmed(stages: Stages, outcome: StageResult) -> StageResult:
     """
     found = stages.confirmed(outcome)
     return found if found.value is None else replace(found, value=outcome.value)
+
+
+def kinds_of(parts: Mapping[str, int] | None, kit: Kit | Stock | None) -> list[str]:
+    """The kinds of parts that are sought or given."""
+    given = kit.kit if isinstance(kit, Stock) else kit
+    return list(parts or {}) if given is None else list(given.sizes)
 
 
 def check_request(
@@ -217,6 +228,8 @@ def described_job(
         numbers = (rows.indptr, rows.indices, rows.data, constraints.lower, constraints.upper)
         values["stages"]["constraints"] = {"rows": constraints.rows, "digest": digest(*numbers)}
     del values["jobs"]
+    if not any(part_kind(name).penalty is not None for name in kinds_of(parts, kit)):
+        del values["stages"]["slit_cost"]
     given: dict[str, Any] = {}
     if isinstance(kit, Stock):
         given = {"stock": kit.to_dict(), "together": kit.together}

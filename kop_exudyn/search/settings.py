@@ -47,6 +47,7 @@ _POSITIVE = (
     "round_tolerance",
     "assigned_tolerance",
     "reassigned_tolerance",
+    "slit_cost",
 )
 _COUNTS = ("relaxed_steps", "assigned_steps", "round_steps", "path_steps", "restarts")
 _FROM_ZERO = ("reassignments", "leaps", "redeployments", "rescues", "growth", "seed")
@@ -84,6 +85,10 @@ class StageSettings:
     reuse : what fewer pieces are worth that have to be made so that the designs can be built one
         after the other: for 1 % less of them the objective may rise by this many %. Results are
         compared by J times the share of fabricated pieces to this power
+    slit_cost : of slit parts, over the weight of the fit: where the slits of a kit are as long as
+        the median element, J is larger by half of this times that weight, and with the slits'
+        mean square. 1e-3: slits of a tenth of that length count like joints 0.2 % of a design's
+        size away from its target
     effort : "quick", "normal" or "thorough": from how many starts the assigned stage runs, see
         starts.py
     requirements : that the kit's designs have to meet, see there; not those of the baselines
@@ -113,6 +118,7 @@ class StageSettings:
     constraints: LinearConstraints | None = None
     hessian: str = "exact"
     reuse: float = 0.0
+    slit_cost: float = 1e-3
     effort: str = "normal"
     requirements: Requirements = Requirements()
 

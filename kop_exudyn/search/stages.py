@@ -15,6 +15,8 @@ import numpy as np
 from ..errors import InputError, SimulationFailure
 from ..files.arrays import numbers_of
 from ..kit.cluster import cluster
+from ..kit.kinds import part_kind
+from ..kit.part_costs import PartCosts
 from ..kit.parts import Assignment, Kit
 from ..kit.projection import Projection
 from ..kit.reuse import PieceCount
@@ -90,14 +92,27 @@ class Stages:
         self.rule = rule_of(parts, dataset.group_designs)
         self.store, self.observer = store or NoStore(), observer or (lambda event: None)
         self.q0 = dataset.parameters
-        self.projection = Projection.of_inputs(dataset.groups, self.q0, bounds=settings.bounds)
+        self.costs = PartCosts.of(
+            dataset.groups, self.q0, settings.slit_cost * (weights.fit or weights.energy)
+        )
+        self.projection = Projection.of_inputs(
+            dataset.groups,
+            self.q0,
+            bounds=settings.bounds,
+            penalties=self.costs.at_weight(self.schedule[0]),
+        )
 
     def direct(self) -> StageResult:
         """Cluster the inputs (or take the given kit), replace every element by its part."""
         kit, assignment = self.rule.first(
             self.dataset.groups, self.q0, self.projection, self.settings
         )
-        return self.confirmed(self.built_from(kit, assignment, self.inputs()))
+        return self.confirmed(self.built_from(self._limited(kit), assignment, self.inputs()))
+
+    @property
+    def optimises(self) -> bool:
+        """Whether the assigned stage has variables: parts, or elements that slide in given ones."""
+        return self.rule.parts_move or len(self.dataset.sliding) > 0
 
     def inputs(self) -> list[Evaluation]:
         """The input designs, judged by the objective."""
@@ -189,6 +204,8 @@ class Stages:
             self.settings.bounds,
             constraints,
             self.rule.stock,
+            self.costs,
+            self.rule.parts_move,
         )
 
     def built_from(
@@ -210,7 +227,7 @@ class Stages:
 
     def judged(self, result: StageResult) -> StageResult:
         """The same result with the objective of its designs, and the cost of exceeded bounds."""
-        value, penalty = self._value(result.designs)
+        value, penalty = self._value(result.designs, result.kit)
         return replace(
             result,
             value=value,
@@ -311,7 +328,8 @@ class Stages:
         settings = self.settings
         attempts = settings.rescues + self.rule.growth(settings)
         for attempt in range(attempts + 1):
-            designs, jumps = self._to_parts(relaxed.evaluations, relaxed.kit, relaxed.assignment)
+            kit = self._limited(relaxed.kit)
+            designs, jumps = self._to_parts(relaxed.evaluations, kit, relaxed.assignment)
             failed = [d for d in designs if isinstance(d, SimulationFailure)]
             for jump in jumps:
                 log.warning(
@@ -327,7 +345,7 @@ class Stages:
                 break
             relaxed = self._rescued(relaxed, attempt, jumps)
         return relaxed, self.confirmed(
-            self._result(designs, relaxed.kit, relaxed.assignment, jumps=jumps)
+            self._result(designs, kit, relaxed.assignment, jumps=jumps)
         )
 
     def from_neighbour(self, q: np.ndarray) -> StageResult:
@@ -343,7 +361,7 @@ class Stages:
         kit, assignment = self.rule.first(
             self.dataset.groups, there, self.projection, self.settings
         )
-        return self.confirmed(self.built_from(kit, assignment, start))
+        return self.confirmed(self.built_from(self._limited(kit), assignment, start))
 
     def _rescued(self, relaxed: StageResult, attempt: int, jumps: list[Jump]) -> StageResult:
         """The relaxed stage again from its end: with w_c raised, later with one more part of every
@@ -367,6 +385,7 @@ class Stages:
                 bounds=settings.bounds,
                 restarts=settings.restarts,
                 seed=settings.seed,
+                penalties=self.projection.penalties,
             ).kit
         result, _ = self._relax(f"rescue-{attempt + 1}", weight, q, relaxed.evaluations, kit)
         data = result.point.data
@@ -392,7 +411,7 @@ class Stages:
         settings = self.settings
         problem = RelaxedProblem(
             self.dataset,
-            self.projection.with_weight(weight),
+            self.projection.with_weight(weight, self.costs.at_weight(weight)),
             kit,
             settings.bounds,
             settings.constraints,
@@ -458,10 +477,19 @@ class Stages:
         return result
 
     def _realised(self, kit: Kit, assignment: Assignment, free: np.ndarray) -> np.ndarray:
-        """(n_q,) every element its part, and the parameters of no element (k,) as given."""
-        q = assignment.matrix(kit) @ kit.vector
+        """(n_q,) every element its part, and the parameters of no element (k,) as given; those of
+        elements that slide in their parts as near to what is given as these allow."""
+        q = np.zeros(assignment.n_q)
         q[self.dataset.free] = free
-        return q
+        return assignment.realise(kit, q)
+
+    def _limited(self, kit: Kit) -> Kit:
+        """A kit that is sought, whose parts keep to their own limits; a given one as it is."""
+        kinds = [name for name in kit.parts if part_kind(name).limits is not None]
+        if not kinds or not self.rule.parts_move:
+            return kit
+        limited = {name: part_kind(name).limited(kit[name]) for name in kinds}
+        return Kit({**kit.parts, **limited}, kit.units)
 
     def _to_parts(
         self,
@@ -503,7 +531,7 @@ class Stages:
         status: str = "",
         jumps: Sequence[Jump] = (),
     ) -> StageResult:
-        value, penalty = self._value(designs)
+        value, penalty = self._value(designs, kit)
         return StageResult(
             designs,
             kit,
@@ -530,14 +558,15 @@ class Stages:
         return float((count.fabricated / count.elements) ** self.settings.reuse)
 
     def _value(
-        self, designs: Sequence[Evaluation | SimulationFailure]
+        self, designs: Sequence[Evaluation | SimulationFailure], kit: Kit
     ) -> tuple[float | None, float]:
-        """The objective, where no design failed, and the cost of exceeded bounds."""
+        """The objective with what the parts cost, where no design failed, and the cost of exceeded
+        bounds."""
         found = [design for design in designs if isinstance(design, Evaluation)]
         if len(found) < len(designs):
             return None, 0.0
         value = self.dataset.value(found)
-        return value, self.dataset.merit(found) - value
+        return value + self.costs.value(kit), self.dataset.merit(found) - value
 
 
 def _pressure(result: SQPResult) -> dict[str, dict[str, float]]:

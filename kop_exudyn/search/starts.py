@@ -132,7 +132,7 @@ def model_starts(
                     "a start under the model (damping %g): J = %s, predicted %.5g",
                     damping,
                     built.value,
-                    sum(e.value for e in refined) + start.predicted.sum(),
+                    sum(e.value for e in refined) + start.total,
                 )
                 found.append(built)
     whole = [built for built in found if built.value is not None]
@@ -153,6 +153,7 @@ def _best_under(stages: Stages, model: LocalModel, options: Effort) -> list[Reas
             bounds=settings.bounds,
             restarts=1,
             seed=settings.seed + number,
+            penalties=stages.projection.penalties,
         )
         best = _improved(stages, model, first.kit, first.assignment)
         for _ in range(options.shakes):
@@ -160,13 +161,13 @@ def _best_under(stages: Stages, model: LocalModel, options: Effort) -> list[Reas
                 break
             shaken = _shaken(best.assignment, best.kit, rng)
             trial = _improved(stages, model, best.kit, shaken)
-            if trial is not None and trial.predicted.sum() < best.predicted.sum():
+            if trial is not None and trial.total < best.total:
                 best = trial
         ends += [best] if best is not None else []
-    ends.sort(key=lambda end: float(end.predicted.sum()))
+    ends.sort(key=lambda end: end.total)
     kept: list[Reassignment] = []
     for end in ends:
-        value, values = end.predicted.sum(), [k.predicted.sum() for k in kept]
+        value, values = end.total, [k.total for k in kept]
         if all(abs(value - other) > _SAME * abs(other) for other in values):
             kept.append(end)
     return kept[: options.built]
@@ -176,7 +177,12 @@ def _improved(
     stages: Stages, model: LocalModel, kit: Kit, assignment: Assignment
 ) -> Reassignment | None:
     problem = AssignedProblem(
-        stages.dataset, kit, assignment, stages.settings.bounds, stages.settings.constraints
+        stages.dataset,
+        kit,
+        assignment,
+        stages.settings.bounds,
+        stages.settings.constraints,
+        costs=stages.costs,
     )
     return improved(problem, model)
 

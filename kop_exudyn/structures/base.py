@@ -67,7 +67,7 @@ class Role:
     fitted: bool = False
 
 
-_MADE_ANEW = (_WORKSPACES, "way")  # in every process
+MADE_ANEW = (_WORKSPACES, "way")  # in every process, and for every copy
 
 
 class Design(ABC):
@@ -172,7 +172,7 @@ class Design(ABC):
     def __getstate__(self) -> dict[str, Any]:
         """What travels to another process: everything but the solver workspaces, which are made
         anew there."""
-        return {key: value for key, value in self.__dict__.items() if key not in _MADE_ANEW}
+        return {key: value for key, value in self.__dict__.items() if key not in MADE_ANEW}
 
     @cached_property
     def way(self) -> Way | None:
