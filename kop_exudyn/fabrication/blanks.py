@@ -199,7 +199,7 @@ class Blanks:
         d, breadth = self.options.bolt_hole, self.board.breadth
         # where strips are built in shorter than they can be, they must not meet at their corner
         slides = [float(v[2]) for k, _, _, v, _ in self._needed() if has_joint(k) and len(v) > 2]
-        setback = setback_of(breadth, float(angles.max())) 
+        setback = setback_of(breadth, float(angles.max()))
         setback += self.scale * max(slides, default=0.0)
         leg = min(_LEG * breadth, _LEG_SHARE * float(sides.min()))
         # where that is too long for the shortest side, `problems` says so

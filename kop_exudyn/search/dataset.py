@@ -170,9 +170,10 @@ class Dataset:
             elif kind.realises_intervals and len(group.indices):
                 ways = kind.variants_of(group.indices.shape[1])
                 assert ways.reach is not None
-                low, high = (ways.matrices @ low).min(axis=0), _times(
-                    ways.matrices + ways.reach, high
-                ).max(axis=0)
+                low, high = (
+                    (ways.matrices @ low).min(axis=0),
+                    _times(ways.matrices + ways.reach, high).max(axis=0),
+                )
             else:
                 # an element may be realised mirrored: each of its lengths must suit one side of a
                 # part

@@ -170,9 +170,7 @@ class AssignedProblem:
             else LinearConstraints.none(self.n)
         )
         if len(self.sliding):
-            rows = limit_rows(
-                assignment, kit, self.sliding, self.n, parts_move, self.part_bounds
-            )
+            rows = limit_rows(assignment, kit, self.sliding, self.n, parts_move, self.part_bounds)
             self.constraints = stacked(self.constraints, rows)
             if not parts_move:
                 p = kit.vector

@@ -20,17 +20,16 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..compiled.library import address, library
-from ..kit.kinds import Variants, part_kind
+from ..kit.kinds import part_kind
 from ..kit.parts import Assignment, Kit
 from ..kit.reuse import PieceCount
-from ..sqp.qp import QP, QPSolver
+from ..sqp.qp import QP, QPOptions, QPSolver
 from .objective import DesignDerivatives
 from .problems import AssignedProblem
-from .sliding import best_in_boxes
+from .sliding import Counting, descend_in_boxes
 
 _SETTLED = 1e-6  # rounds that gain less than this share of the gain so far are the last
 _ROUNDS = 50
-_BOX_SWEEPS = 20  # over elements that slide, before the parts are moved
 
 
 @dataclass(frozen=True)
@@ -124,7 +123,8 @@ def reassign(
 
     Where the problem has a stock, no more pieces are used than there are: elements take what is
     left, and exchange what they have; elements of kinds that realise intervals keep their parts
-    then. Otherwise these get the part in which they have the best place. Where pieces cost, what is lowered is the model with the cost of the pieces to be made.
+    then. Otherwise these get the part in which they have the best place. Where pieces cost, what is
+    lowered is the model with the cost of the pieces to be made.
     Returns None where no element gains by another part, or the constraints can't be met with
     what it would get.
     """
@@ -203,15 +203,14 @@ def _sweep(
         ways = part_kind(group.kind).variants_of(group.indices.shape[1])
         if ways.reach is not None:
             if stock is None:
-                parts[number], variants[number], moved = _descend_in_boxes(
+                count_of = None if count is None else Counting(count, group.kind, int(n))
+                parts[number], variants[number], moved = descend_in_boxes(
                     (q[n], slopes[n], model.hessians[n]),
                     group.indices - offsets[n],
                     (ways, kit[group.kind]),
                     parts[number] * len(ways.names) + variants[number],
-                    model,
-                    count,
-                    group.kind,
-                    int(n),
+                    (model.rounding, model.piece_cost),
+                    count_of,
                 )
                 changes += moved
             continue
@@ -241,60 +240,6 @@ def _sweep(
     return Assignment(
         problem.assignment.groups, tuple(parts), tuple(variants), problem.assignment.n_q
     ), np.concatenate(q)
-
-
-def _descend_in_boxes(
-    state: tuple[np.ndarray, np.ndarray, np.ndarray],
-    indices: np.ndarray,
-    parts: tuple[Variants, np.ndarray],
-    choice: np.ndarray,
-    model: LocalModel,
-    count: PieceCount | None,
-    kind: str,
-    design: int,
-) -> tuple[np.ndarray, np.ndarray, int]:
-    """As `_descend` and `_descend_counted` without a stock, for elements that slide in their parts:
-    each is given the part in which its best place is best, and moved there.
-
-    state : q, slope and hessian of the design, the first two brought up to date
-    indices : (n, k_e) of the elements in q;  parts : the variants, and the parts (m, k_p)
-    choice : (n,) part times the number of variants, plus the variant
-
-    Returns parts and variants (n,), and how many changed.
-    """
-    q, slope, hessian = state
-    ways, values = parts
-    n_ways = len(ways.names)
-    assert ways.reach is not None
-    low, high = (
-        np.einsum("vek,mk->mve", maps, values).reshape(-1, indices.shape[1])
-        for maps in (ways.matrices, ways.matrices + ways.reach)
-    )
-    total, choice = 0, choice.copy()
-    for _ in range(_BOX_SWEEPS):
-        changed = 0
-        for e, own in enumerate(indices):
-            steps, gains = best_in_boxes(
-                low - q[own], high - q[own], slope[own], hessian[np.ix_(own, own)]
-            )
-            mine = int(choice[e]) // n_ways
-            if count is not None:
-                gains += model.piece_cost * np.repeat(count.changes(kind, design, mine), n_ways)
-            which = int(np.argmin(gains))
-            if gains[which] >= gains[choice[e]] - model.rounding:
-                which = int(choice[e])
-            if gains[which] < -model.rounding or which != choice[e]:
-                slope += steps[which] @ hessian[own]
-                q[own] += steps[which]
-            if which != choice[e]:
-                if count is not None:
-                    count.move(kind, design, mine, which // n_ways)
-                choice[e] = which
-                changed += 1
-        total += changed
-        if not changed:
-            break
-    return choice // n_ways, choice % n_ways, total
 
 
 def _descend(
@@ -472,7 +417,7 @@ def best_parts(
         lower, upper = lower.copy(), upper.copy()
         of_parts = slice(len(problem.kit.vector))
         lower[of_parts] = upper[of_parts] = vector[of_parts]
-    result = QPSolver().solve(
+    result = QPSolver(QPOptions(interior_point=len(problem.sliding) > 0)).solve(
         QP(
             sp.csc_matrix(hessian),
             gradient,

@@ -8,16 +8,19 @@ coordinates that may lie at an end: for one or two coordinates that is quicker t
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 import scipy.sparse as sp
 
-from ..kit.kinds import Bounds, part_kind
+from ..kit.kinds import Bounds, Variants, part_kind
 from ..kit.parts import Assignment, Kit
+from ..kit.reuse import PieceCount
 from ..sqp.constraints import LinearConstraints
 
 _FLAT = 1e-12  # of the curvature: below, a coordinate has no minimum of its own
+_SWEEPS = 20  # over elements, before the parts are moved
 
 
 def limit_rows(
@@ -60,9 +63,7 @@ def limit_rows(
     return LinearConstraints(matrix, at_least, np.full(len(at_least), np.inf), tuple(names))
 
 
-def _part_rows(
-    name: str, m: int, bounds: Bounds | None
-) -> tuple[np.ndarray, np.ndarray]:
+def _part_rows(name: str, m: int, bounds: Bounds | None) -> tuple[np.ndarray, np.ndarray]:
     """(r, m k_p) rows and (r,) what they are at least, of all parts of a kind."""
     kind = part_kind(name)
     k = kind.n_parameters
@@ -119,3 +120,68 @@ def best_in_boxes(
         better = gains < least
         best[better], least[better] = d[better], gains[better]
     return best, least
+
+
+@dataclass(frozen=True)
+class Counting:
+    """Where pieces cost: their count, and which kind and design elements are of."""
+
+    count: PieceCount
+    kind: str
+    design: int
+
+
+def descend_in_boxes(
+    state: tuple[np.ndarray, np.ndarray, np.ndarray],
+    indices: np.ndarray,
+    parts: tuple[Variants, np.ndarray],
+    choice: np.ndarray,
+    prices: tuple[float, float],
+    counting: Counting | None = None,
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """Coordinate descent over one group of elements that slide in their parts: each is given the
+    part in which its best place is best, and moved there, until none gets another.
+
+    state : q, slope and hessian of the design, the first two brought up to date
+    indices : (n, k_e) of the elements in q;  parts : the variants, and the parts (m, k_p)
+    choice : (n,) part times the number of variants, plus the variant
+    prices : gain that counts, and what a piece to be made costs
+    counting : the pieces where these cost; brought up to date
+
+    Returns parts and variants (n,), and how many changed.
+    """
+    q, slope, hessian = state
+    ways, values = parts
+    n_ways = len(ways.names)
+    assert ways.reach is not None
+    low, high = (
+        np.einsum("vek,mk->mve", maps, values).reshape(-1, indices.shape[1])
+        for maps in (ways.matrices, ways.matrices + ways.reach)
+    )
+    least, piece = prices
+    total, choice = 0, choice.copy()
+    for _ in range(_SWEEPS):
+        changed = 0
+        for e, own in enumerate(indices):
+            steps, gains = best_in_boxes(
+                low - q[own], high - q[own], slope[own], hessian[np.ix_(own, own)]
+            )
+            mine = int(choice[e]) // n_ways
+            if counting is not None:
+                more = counting.count.changes(counting.kind, counting.design, mine)
+                gains += piece * np.repeat(more, n_ways)
+            which = int(np.argmin(gains))
+            if gains[which] >= gains[choice[e]] - least:
+                which = int(choice[e])
+            if gains[which] < -least or which != choice[e]:
+                slope += steps[which] @ hessian[own]
+                q[own] += steps[which]
+            if which != choice[e]:
+                if counting is not None:
+                    counting.count.move(counting.kind, counting.design, mine, which // n_ways)
+                choice[e] = which
+                changed += 1
+        total += changed
+        if not changed:
+            break
+    return choice // n_ways, choice % n_ways, total

@@ -24,6 +24,7 @@ from ..kit.stock import Stock
 from ..sqp.constraints import check_feasible
 from ..sqp.history import SQPState
 from ..sqp.problem import Point
+from ..sqp.qp import QPOptions
 from ..sqp.solver import SQPOptions, SQPResult, minimise
 from .dataset import Dataset, all_or_raise, evaluations_from_arrays, evaluations_to_arrays
 from .events import ASSIGNED, Observer, SQPLabel, Stage, StageEvent
@@ -179,6 +180,7 @@ class Stages:
             max_steps=max_steps or self.settings.assigned_steps,
             decrease_tolerance=tolerance or self.settings.assigned_tolerance,
             penalty=self.dataset.penalty,
+            qp=QPOptions(interior_point=len(problem.sliding) > 0),
         )
         result = self._sqp(label, problem, point, options)
         designs = list(start.designs)
@@ -344,9 +346,7 @@ class Stages:
             if not needed or attempt == attempts:
                 break
             relaxed = self._rescued(relaxed, attempt, jumps)
-        return relaxed, self.confirmed(
-            self._result(designs, kit, relaxed.assignment, jumps=jumps)
-        )
+        return relaxed, self.confirmed(self._result(designs, kit, relaxed.assignment, jumps=jumps))
 
     def from_neighbour(self, q: np.ndarray) -> StageResult:
         """The designs led to the elements q (n_q,) of another kit, and from there to the parts that
