@@ -82,7 +82,10 @@ def assigned_stage(
 
 
 def opened_stage(
-    stages: Stages, start: StageResult, before: StageResult | None = None
+    stages: Stages,
+    start: StageResult,
+    before: StageResult | None = None,
+    numbers: Iterator[int] | None = None,
 ) -> StageResult:
     """Designs that open into their shape by themselves, and keep to it whatever errors of the
     workshop do: rounds from where they open into, again and again.
@@ -95,11 +98,12 @@ def opened_stage(
     `forgiving_stage`.
 
     before : where the assigned stage began
+    numbers : of the rounds, where this isn't the first call: every SQP has a name of its own
 
     The result's states are those that the designs open into, unless one doesn't open at all.
     """
     settings = stages.settings
-    result, numbers = start, count(_rounds_at_most(settings))
+    result, numbers = start, numbers or count(_rounds_at_most(settings))
     if not stages.required.opening:
         return forgiving_stage(stages, start, (), numbers, before)
     found: list[StageResult] = []

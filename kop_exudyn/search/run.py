@@ -33,7 +33,7 @@ from .result import KitResult
 from .settings import JobSettings
 from .stage_results import StageResult
 from .stages import NoStore, Stages, Store
-from .starts import assigned_from_starts
+from .starts import assigned_from_starts, forgiving_from_starts
 
 log = logging.getLogger(__name__)
 
@@ -135,9 +135,11 @@ def optimize_kit(
         bases = []
         if "relaxed" in found and all(isinstance(d, Evaluation) for d in found["relaxed"].designs):
             bases = [stages.inputs(), found["relaxed"].evaluations]
-        found["assigned"], result.tried = assigned_from_starts(stages, result.at_parts, bases)
+        starts = assigned_from_starts(stages, result.at_parts, bases)
         announce("deployment of the assigned designs")
-        found["assigned"] = opened_stage(stages, found["assigned"], result.at_parts)
+        opened = opened_stage(stages, starts.best, result.at_parts)
+        found["assigned"] = forgiving_from_starts(stages, starts, opened, result.at_parts)
+        result.tried = starts.tried
         result.seconds["search"] = perf_counter() - begin_search
         found.update({stage: _confirmed(stages, outcome) for stage, outcome in found.items()})
         result.redeployed = stages.redeployed(found["assigned"])

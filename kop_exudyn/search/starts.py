@@ -19,7 +19,7 @@ import numpy as np
 from ..kit.cluster import cluster
 from ..kit.kinds import part_kind
 from ..kit.parts import Assignment, Kit
-from .assigned import assigned_stage
+from .assigned import assigned_stage, opened_stage
 from .events import SQPLabel
 from .exchange import exchanged
 from .objective import Evaluation
@@ -37,6 +37,7 @@ _SHAKEN = 0.05  # of the elements get any other part, at least two
 # parts): one that began at 1.9 times J of the relaxed designs' parts ended 17 % below these.
 _PROMISING = 3.0
 _NUMBERS = 100  # of rounds, at most, of each start: every SQP has a name of its own
+_SPARE = 3  # other starts, at most, that are tried where designs of the best one snap
 _SAME = 1e-6  # relative; starts whose predictions are that close are one
 
 
@@ -56,9 +57,26 @@ class TriedStart:
     kept: bool = False
 
 
+@dataclass
+class Starts:
+    """What the assigned stage ended in from several starts.
+
+    best : result; tried : what was tried, in the order of the starts
+    others : results from other starts, in the order of J
+    left : numbers in `tried` of starts that weren't optimised, and these, in the order of J
+    first : number of the next SQP that has no name yet
+    """
+
+    best: StageResult
+    tried: list[TriedStart]
+    others: list[tuple[int, StageResult]]
+    left: list[tuple[int, StageResult]]
+    first: int
+
+
 def assigned_from_starts(
     stages: Stages, built: StageResult, bases: Sequence[Sequence[Evaluation]]
-) -> tuple[StageResult, list[TriedStart]]:
+) -> Starts:
     """The best of assigned stages from several starts, and what was tried.
 
     built : the relaxed designs at their parts, which is always a start
@@ -78,6 +96,7 @@ def assigned_from_starts(
     promising = [n for n in range(len(starts)) if n == 0 or starts[n][1].merit <= limit]
     order = sorted(promising, key=lambda n: starts[n][1].merit)[: effort.optimised]
     best, which = built, 0
+    ends: list[tuple[int, StageResult]] = []
     for k, n in enumerate(order):
         start = starts[n][1] if starts[n][0] == "relaxed" else stages.confirmed(starts[n][1])
         numbers = None if k == 0 else count(1 + _NUMBERS * k)
@@ -86,6 +105,7 @@ def assigned_from_starts(
         log.info(
             "start %d (%s) ends at J = %s, from %s", k + 1, starts[n][0], end.value, start.value
         )
+        ends.append((n, end))
         if k == 0 or end.merit < best.merit:
             best, which = end, n
     numbers = count(1 + _NUMBERS * len(order))
@@ -101,7 +121,48 @@ def assigned_from_starts(
         ),
     )
     tried[which] = replace(tried[which], optimised=best.value, kept=True)
-    return replace(best, jumps=built.jumps), tried
+    left = sorted(set(range(len(starts))) - set(order), key=lambda n: starts[n][1].merit)
+    return Starts(
+        replace(best, jumps=built.jumps),
+        tried,
+        sorted(
+            ((n, end) for n, end in ends if n != which and end.value is not None),
+            key=lambda pair: pair[1].merit,
+        ),
+        [(n, starts[n][1]) for n in left if starts[n][1].value is not None],
+        1 + _NUMBERS * (len(order) + 1),
+    )
+
+
+def forgiving_from_starts(
+    stages: Stages, found: Starts, result: StageResult, before: StageResult | None
+) -> StageResult:
+    """A result whose designs keep to their shape whatever errors of the workshop do, from other
+    starts than the best one where that ended in designs that snap; `result` where none helps.
+
+    Whether a kit forgives can't be told from J: kits of nearly the same J differ in it. So the ends
+    of the other starts are looked at, and then starts that weren't optimised, a few at most.
+    """
+    tried, first = found.tried, found.first
+    candidates = [*found.others, *found.left][:_SPARE]
+    optimised = {n for n, _ in found.others}
+    for n, start in candidates if stages.rule.parts_move else ():
+        if not result.snapping:
+            break
+        log.info("designs snap: trying start %d (%s) as well", n + 1, tried[n].origin)
+        numbers, first = count(first), first + _NUMBERS
+        end = start
+        if n not in optimised:
+            end = assigned_stage(stages, stages.confirmed(start), numbers)
+            tried[n] = replace(tried[n], optimised=end.value)
+        if end.value is None:
+            continue
+        opened = opened_stage(stages, end, before, numbers)
+        if opened.value is not None and not opened.snapping:
+            tried[:] = [replace(one, kept=k == n) for k, one in enumerate(tried)]
+            log.info("that one forgives, at J = %.5g, from %s", opened.value, result.value)
+            return replace(opened, steps=result.steps + opened.steps, jumps=result.jumps)
+    return result
 
 
 def model_starts(
