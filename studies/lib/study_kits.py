@@ -73,7 +73,7 @@ def data_sets(models: Path, released: Path, quick: bool = False) -> list[KitCase
         hand
     quick : one design each and hardly any steps
     """
-    stages = QUICK_STAGES if quick else StageSettings()
+    stages = QUICK_STAGES if quick else StageSettings(effort="quick")
     count = 1 if quick else None
     shells = [
         *select_files(models / "conformals", count or 5),

@@ -23,6 +23,7 @@ FEW = VerdictSettings(samples=2)
 def data(repository):
     path = repository / "models" / "grids" / "05_free_form.json"
     found = json.loads(path.read_text(encoding="utf-8"))
+    del found["straightened"]  # of all curves
     for axis in "uv":
         found["network"][axis] = found["network"][axis][1::2]
     return found
@@ -107,6 +108,7 @@ def test_a_load_that_it_cannot_carry(data):
 def test_a_load_that_makes_it_give_way(repository):
     path = repository / "models" / "grids" / "01_dome.json"
     data = json.loads(path.read_text(encoding="utf-8"))
+    del data["straightened"]  # of all curves
     for axis in "uv":
         data["network"][axis] = data["network"][axis][::2]
     case = {"points": [{"joint": 12, "force": [0, 0, -10]}], "factor": 3.0}

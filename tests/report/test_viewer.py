@@ -169,7 +169,7 @@ def test_kit_scene_has_all_stages_and_parts(result, kit_page):
         np.testing.assert_array_equal(counts, [p.uses[n] for p in kit_page.parts[:2]])
         assigned = next(s for s in final if (s.stage, s.role) == ("assigned", "deployed"))
         outcome = result.stages["assigned"].designs[n]
-        assert f"max {outcome.fit.max_percent:.2g} %" in assigned.note
+        assert f"joints at most {outcome.fit.max_percent:.2g} %" in assigned.note
         wanted = outcome.fit.placement.apply(
             outcome.equilibria["deployed"].state.positions[result.designs[n].joints]
         )

@@ -23,6 +23,7 @@ SUPPORTS = [0, 3, 12, 15]
 def data(repository):
     path = repository / "models" / "grids" / "05_free_form.json"
     found = json.loads(path.read_text(encoding="utf-8"))
+    del found["straightened"]  # of all curves
     for axis in "uv":
         found["network"][axis] = found["network"][axis][1::2]
     return found

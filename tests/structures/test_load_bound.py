@@ -27,6 +27,7 @@ def design(repository, file, case):
     path = repository / "models" / file
     data = json.loads(path.read_text(encoding="utf-8"))
     if "network" in data:  # a coarser grid is as good
+        del data["straightened"]  # of all curves
         for axis in "uv":
             data["network"][axis] = data["network"][axis][1::2]
     return design_from_dict({**data, "load_cases": [case]})
@@ -96,6 +97,7 @@ def test_a_load_that_makes_it_give_way(repository):
     case = {"name": "snow", "points": [{"joint": 12, "force": [0, 0, -10]}], "factor": 3.0}
     path = repository / "models" / "grids" / "01_dome.json"
     data = json.loads(path.read_text(encoding="utf-8"))
+    del data["straightened"]  # of all curves
     for axis in "uv":
         data["network"][axis] = data["network"][axis][::2]
     own = design_from_dict({**data, "load_cases": [case]})

@@ -53,6 +53,7 @@ def test_other_sections_keep_their_breadth():
 def data(repository):
     path = repository / "models" / "grids" / "05_free_form.json"
     found = json.loads(path.read_text(encoding="utf-8"))
+    del found["straightened"]  # of all curves
     for axis in "uv":
         found["network"][axis] = found["network"][axis][1::2]
     return found

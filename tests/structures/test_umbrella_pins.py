@@ -13,6 +13,7 @@ from kop_exudyn.equilibrium.newton import NewtonOptions, solve
 from kop_exudyn.equilibrium.system import System
 from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.files.documents import check_schema
+from kop_exudyn.geometry.extent import size_of_points
 from kop_exudyn.scene.actuators import LinearActuators
 from kop_exudyn.search.objective import DesignObjective, Weights
 from kop_exudyn.structures.base import design_from_dict
@@ -51,7 +52,7 @@ def test_pin_places_are_parameters_of_no_element(design):
     assert design.free.tolist() == list(range(12, 21))
     places = design.mesh.target.crossings[[0, 2, 4]]
     assert np.array_equal(design.parameters[12:].reshape(3, 3), places)
-    reach = 0.1 * np.linalg.norm(np.ptp(places, axis=0))
+    reach = 0.1 * size_of_points(places)
     assert np.allclose(design.upper[12:] - design.parameters[12:], reach)
     assert np.allclose(design.parameters[12:] - design.lower[12:], reach)
     assert design.free_scale == pytest.approx(np.median(design.mesh.lengths))
