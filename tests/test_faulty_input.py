@@ -16,6 +16,8 @@ from kop_exudyn.files.arrays import load_arrays, save_arrays, sealed, unsealed
 
 NET = """v 0 0 0\nv 1 0 0\nv 0 .5 0\nv 1 .5 0\nv .2 -1 0\nv .2 1 0\nv .7 -1 0\nv .7 1 0
 l 1 2\nl 3 4\nl 5 6\nl 7 8\n"""
+NET_POINTS = [line[2:] for line in NET.splitlines() if line.startswith("v")]
+NET_LINES = "l 1 2\nl 3 4\nl 5 6\nl 7 8\n"
 ROD = "--section .02,.01 --material 1e9,.3"
 STUDY = 'format = "kop_exudyn/study"\nversion = 1\ndesigns = ["designs"]\n'
 QUICK = """baselines = false
@@ -75,6 +77,11 @@ def place(tmp_path_factory):
         "broken.json.gz": b"\x1f\x8b\x08nothing",
         "text.txt": "hello",
         "net.obj": NET,
+        "far.obj": "".join(
+            f"v {float(x) + 1e9} {y} {z}\n" for x, y, z in (v.split() for v in NET_POINTS)
+        )
+        + NET_LINES,
+        "tiny.obj": "v .2 0 0\nv .201 0 0\nv .2 .001 0\nf 1 2 3\n",
         "nan.obj": "v 0 0 nan\nl 1 2\n",
         "number.obj": "v 0 0 0\nl 1 99\n",
         "drawing.dxf": "hello",
@@ -163,6 +170,8 @@ CASES = (
         ("import array.json --out OUT", "array.json: isn't a released umbrella mesh"),
         ("import run/kit.json --out OUT", "kit.json: format: is a file of kop_exudyn already"),
         (f"import nan.obj --opening .3 {ROD} --out OUT", "nan.obj: line 1"),
+        (f"import far.obj --opening .3 {ROD} --out OUT", "far.obj: curves = [1000000000.5, 0.0,"),
+        (f"import net.obj --opening .3 --target tiny.obj {ROD} --out OUT", "tiny.obj: is 0.00148 in size"),
         (f"import number.obj --opening .3 {ROD} --out OUT", "number.obj: line 2 = 99"),
         (f"import drawing.dxf --opening .3 {ROD} --out OUT", "drawing.dxf: can't be read as DXF"),
         ("import mesh.ply --patch hexagon,2 --out OUT", "mesh.ply: "),

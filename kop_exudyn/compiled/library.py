@@ -26,9 +26,7 @@ def library() -> ctypes.CDLL | None:
     for folder in folders:
         if (folder / file_name()).is_file():
             return _load(folder / file_name())
-    log.warning(
-        "first run: compiling the kernels, once on this machine; this takes 5 to 30 seconds"
-    )
+    log.warning("first run: compiling the kernels, once on this machine")
     reason = ""
     for folder in folders:
         try:

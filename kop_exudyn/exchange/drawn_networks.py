@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..geometry.centring import middle_of
 from ..geometry.curves import Curve, curve_from_dict
 from ..geometry.network import CurveNetwork, network
 from .cleaning import TOLERANCE, cleaned
@@ -139,6 +140,7 @@ def drawn_network(
     # drawings in planes of their own have origins of their own
     standard = frame_of(drawing.curves, size).standard
     points = np.concatenate([curve.points for curve in drawing.curves])
+    middle_of(points, "curves")  # refuses what lies too far away to be told apart
     origin = far_origin(points) if standard else np.zeros(3)
     near = [replace(curve, points=curve.points - origin) for curve in drawing.curves]
     curves, done = cleaned(near, tolerance)

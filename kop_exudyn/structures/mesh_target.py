@@ -16,6 +16,7 @@ from .base import Target
 
 _MAX_ITERATIONS = 200
 _SQUARE = 1e-6
+_SMALLEST = 0.1  # of a design's size: of its target
 _SETTLED = 1e-6  # of the joints' size, by which an iteration moves them
 
 
@@ -40,6 +41,19 @@ def load_target_mesh(data: Mapping[str, Any], folder: Path) -> TriangleSurface:
         raise InputError(
             f"{error.message} ({error.field})", field="target.file", value=path.name
         ) from None
+
+
+def check_target_size(surface: TriangleSurface, size: float, file: str) -> None:
+    """Raise InputError for a target that is much too small for a design of that size: the joints
+    would all be laid onto nearly one place."""
+    own = size_of_points(surface.vertices)
+    if own < _SMALLEST * size:
+        raise InputError(
+            f"is {own:.3g} in size, the design {size:.3g}: are both in the same unit? The field "
+            "target.scale (kop import: --scale) multiplies the target's coordinates",
+            field="target.file",
+            value=file,
+        )
 
 
 def target_on_mesh(surface: TriangleSurface, joints: np.ndarray) -> Target:

@@ -45,7 +45,7 @@ from ..base import (
     register_class,
     register_rescaling,
 )
-from ..mesh_target import load_target_mesh, target_on_mesh
+from ..mesh_target import check_target_size, load_target_mesh, target_on_mesh
 from ..opening import Station, Way
 from .opening import check_hinges, check_opening
 from .scene import RodModel, lay_out, shell_scene
@@ -355,9 +355,12 @@ def read_c_shell(data: Mapping[str, Any], source: str) -> CShell:
         )
         opening = data["opening"]
         mesh = load_target_mesh(data["target"], Path(source).parent) if "target" in data else None
+        network = network_from_dict(data)
+        if mesh is not None:
+            check_target_size(mesh, network.size, data["target"]["file"])
         return CShell(
             data["name"],
-            network_from_dict(data),
+            network,
             model,
             float(opening["angle"]),
             side=-1 if opening.get("side") == "down" else 1,
