@@ -17,12 +17,12 @@ import numpy as np
 
 from ..errors import InputError
 from ..kit.kinds import part_kind
+from ..search.checkpoints import NoStore, PrefixedStore, Store
 from ..search.requirements import Requirements
 from ..search.result import KitResult
 from ..search.run import optimize_kit
 from ..search.settings import JobSettings
 from ..search.stage_results import StageResult
-from ..search.stages import NoStore, PrefixedStore, Store
 from ..structures.base import Design
 from ..structures.strength import strength_summary
 from .reuse import counts_of, fabricated, kit_size_percent

@@ -14,12 +14,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter
 
+from .checkpoints import PrefixedStore, Store
 from .dataset import Dataset
 from .events import Observer
 from .requirements import Requirements
 from .settings import StageSettings
 from .stage_results import StageResult
-from .stages import PrefixedStore, Stages, Store
+from .stages import Stages
 
 # accepted steps at most: the paper tells of 1,019 relaxed and 42 assigned steps for its largest job
 RELAXED_STEPS, ASSIGNED_STEPS = 300, 100

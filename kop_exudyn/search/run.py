@@ -22,6 +22,7 @@ from ..structures.base import Design
 from ..structures.serving import served_by
 from ..units import common_units, unnamed_units
 from .assigned import opened_stage
+from .checkpoints import NoStore, Store
 from .dataset import Dataset
 from .events import UNRELAXED, Observer, StageEvent
 from .neighbours import resized
@@ -32,7 +33,7 @@ from .requirements import Requirements
 from .result import KitResult
 from .settings import JobSettings
 from .stage_results import StageResult
-from .stages import NoStore, Stages, Store
+from .stages import Stages
 from .starts import assigned_from_starts, forgiving_from_starts
 
 log = logging.getLogger(__name__)

@@ -3,17 +3,14 @@ assigned."""
 
 from __future__ import annotations
 
-import json
 import logging
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from typing import Any, Protocol
 
 import numpy as np
 
 from ..errors import InputError, SimulationFailure
-from ..files.arrays import numbers_of
 from ..kit.cluster import cluster
 from ..kit.kinds import part_kind
 from ..kit.part_costs import PartCosts
@@ -22,12 +19,11 @@ from ..kit.projection import Projection
 from ..kit.reuse import PieceCount
 from ..kit.stock import Stock
 from ..sqp.constraints import check_feasible
-from ..sqp.history import SQPState
-from ..sqp.problem import Point
 from ..sqp.qp import QPOptions
-from ..sqp.solver import SQPOptions, SQPResult, minimise
-from .dataset import Dataset, all_or_raise, evaluations_from_arrays, evaluations_to_arrays
-from .events import ASSIGNED, Observer, SQPLabel, Stage, StageEvent
+from ..sqp.solver import SQPOptions, SQPResult
+from .checkpoints import NoStore, Store, minimise_kept
+from .dataset import Dataset, all_or_raise
+from .events import ASSIGNED, Observer, SQPLabel, Stage
 from .kit_rule import rule_of
 from .objective import Evaluation, Weights
 from .problems import AssignedProblem, RelaxedProblem
@@ -35,37 +31,6 @@ from .settings import StageSettings
 from .stage_results import Jump, StageResult, find_jump, restrict
 
 log = logging.getLogger(__name__)
-
-
-class Store(Protocol):
-    """Where checkpoints go: named sets of plain arrays."""
-
-    def load(self, name: str) -> Mapping[str, np.ndarray] | None: ...
-
-    def save(self, name: str, arrays: Mapping[str, np.ndarray]) -> None: ...
-
-
-class NoStore:
-    """Keeps nothing."""
-
-    def load(self, name: str) -> None:
-        return None
-
-    def save(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
-        pass
-
-
-class PrefixedStore:
-    """A store that puts a prefix before the names of its checkpoints."""
-
-    def __init__(self, store: Store, prefix: str):
-        self.store, self.prefix = store, prefix
-
-    def load(self, name: str) -> Mapping[str, np.ndarray] | None:
-        return self.store.load(self.prefix + name)
-
-    def save(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
-        self.store.save(self.prefix + name, arrays)
 
 
 class Stages:
@@ -182,7 +147,7 @@ class Stages:
             penalty=self.dataset.penalty,
             qp=QPOptions(interior_point=len(problem.sliding) > 0),
         )
-        result = self._sqp(label, problem, point, options)
+        result = minimise_kept(label, problem, point, options, self.store, self.observer)
         designs = list(start.designs)
         for n, evaluation in zip(members, result.point.data.evaluations):
             designs[n] = evaluation
@@ -426,55 +391,14 @@ class Stages:
             penalty=self.dataset.penalty,
         )
         label = SQPLabel(name, Stage.RELAXED, weight=weight)
-        return self._sqp(label, problem, problem.point(q, list(evaluations), kit), options), problem
-
-    def _sqp(self, label: SQPLabel, problem: Any, start: Point, options: SQPOptions) -> SQPResult:
-        """Minimise, or go on from the store's checkpoint of that name."""
-        name, tally = label.name, problem.dataset.tally
-        before = (tally.equilibria, tally.newton_iterations)
-        state, saved = None, self.store.load(name)
-        terms: list[str] = []
-        if saved is not None:
-            try:
-                state, start, terms = _restored(problem, saved, start.x.shape)
-                equilibria, iterations = numbers_of(saved, "tally", (2,)).astype(int).tolist()
-                rows = [json.loads(row) for row in terms]
-            # some array is missing or of another shape
-            except (IndexError, KeyError, TypeError, ValueError, AttributeError):
-                raise InputError(
-                    f"the checkpoint {name!r} is damaged: start anew instead of resuming"
-                ) from None
-            tally.equilibria += equilibria
-            tally.newton_iterations += iterations
-            for record, row in zip(state.history, rows):
-                self.observer(StageEvent(label, record, row))
-
-        def checkpoint(state: SQPState, point: Point) -> None:
-            terms.append(json.dumps(point.data.terms))
-            self.observer(StageEvent(label, state.history[-1], point.data.terms))
-            self.store.save(
-                name,
-                {
-                    **{f"sqp/{k}": v for k, v in state.to_arrays().items()},
-                    **{
-                        f"states/{k}": v
-                        for k, v in evaluations_to_arrays(point.data.solved).items()
-                    },
-                    "kit": point.data.kit.vector,
-                    "terms": np.array(terms),
-                    "tally": np.array(
-                        [tally.equilibria - before[0], tally.newton_iterations - before[1]]
-                    ),
-                },
-            )
-
-        result = minimise(
-            problem, start.x, options, checkpoint=checkpoint, state=state, start=start
-        )
-        log.info(
-            "%s: %d steps, J = %.6g, %s", name, result.steps, result.point.value, result.status
-        )
-        return result
+        return minimise_kept(
+            label,
+            problem,
+            problem.point(q, list(evaluations), kit),
+            options,
+            self.store,
+            self.observer,
+        ), problem
 
     def _realised(self, kit: Kit, assignment: Assignment, free: np.ndarray) -> np.ndarray:
         """(n_q,) every element its part, and the parameters of no element (k,) as given; those of
@@ -576,22 +500,3 @@ def _pressure(result: SQPResult) -> dict[str, dict[str, float]]:
         if value > 0:
             found.setdefault(design, {})[state] = float(value)
     return found
-
-
-def _restored(
-    problem: Any, saved: Mapping[str, np.ndarray], shape: tuple[int, ...]
-) -> tuple[SQPState, Point, list[str]]:
-    """State, point (of variables of this shape) and the steps' terms of a checkpoint."""
-    state = SQPState.from_arrays({k[4:]: v for k, v in saved.items() if k.startswith("sqp/")})
-    if state.x.shape != shape or saved["terms"].shape != (len(state.history),):
-        raise ValueError("a checkpoint of other variables, or of other steps")
-    evaluations = evaluations_from_arrays(
-        problem.dataset, {k[7:]: v for k, v in saved.items() if k.startswith("states/")}
-    )
-    kit = numbers_of(saved, "kit", (None,))
-    point = (
-        problem.point(state.x, evaluations, problem.kit.with_vector(kit))
-        if isinstance(problem, RelaxedProblem)
-        else problem.point(state.x, evaluations)
-    )
-    return state, point, [str(row) for row in saved["terms"]]
