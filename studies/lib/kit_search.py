@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from kop_exudyn.search.objective import Evaluation
 from kop_exudyn.search.result import KitResult
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
@@ -42,7 +43,11 @@ def find_kit(
 
 def _plain(result: KitResult) -> dict[str, Any]:
     offsets = np.cumsum([len(design.parameters) for design in result.designs])[:-1]
-    realised = np.split(result.assignment.matrix(result.kit) @ result.kit.vector, offsets)
+    q = [
+        outcome.q if isinstance(outcome, Evaluation) else design.parameters
+        for outcome, design in zip(result.stages["assigned"].designs, result.designs)
+    ]
+    realised = np.split(result.assignment.realise(result.kit, np.concatenate(q)), offsets)
     return {
         "kit": result.kit.to_dict(),
         "assignment": result.assignment.to_dict(),

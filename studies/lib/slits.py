@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,10 @@ from kop_exudyn.kit.parts import Assignment, Kit
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.objective import Evaluation, Weights
 from kop_exudyn.search.pool import DesignPool
+from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.result import summary_of
+from kop_exudyn.search.run import optimize_kit
+from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.structures.base import Design
 
 
@@ -69,6 +73,62 @@ def slit_kit(
                 for design, figures in zip(designs, _built(dataset, realised, path_steps))
             ],
         }
+
+
+def optimised_kit(
+    designs: Sequence[Design],
+    kind: str,
+    m: int,
+    corners: int,
+    stages: StageSettings,
+    jobs: int = 1,
+) -> dict[str, Any]:
+    """A kit of m plain or slit parts for the linear elements, by both stages of the search; nothing
+    is required of the designs but that they are equilibria.
+
+    kind : "linear" or "slit";  corners : number of angular parts
+
+    Returns
+    objective : J with the cost of slits, None where a design failed; slit_cost : what they are of
+        it
+    pieces : of beams to make, so that the designs can be built one after the other
+    slits : (m,) lengths in % of the median length of the linear elements
+    max_percent : largest deviation of all designs, None where one failed
+    outside_percent : by how much the furthest length is outside of what its part realises, in % of
+        the median
+    seconds : wall time of the search
+
+    Raises as `optimize_kit`.
+    """
+    settings = JobSettings(
+        stages=replace(stages, requirements=Requirements.none()), jobs=jobs, baselines=False
+    )
+    result = optimize_kit(designs, {kind: m, "angular": corners}, settings=settings)
+    assigned = result.stages["assigned"]
+    found = [design for design in assigned.designs if isinstance(design, Evaluation)]
+    whole = len(found) == len(assigned.designs)
+    lengths = [
+        design.parameters[group.indices].ravel()
+        for design in result.designs
+        for group in design.groups
+        if group.kind == kind
+    ]
+    scale = float(np.median(np.concatenate(lengths)))
+    deviations = [
+        result.summary("assigned", n)["fit"]["max_percent"] for n in range(len(found)) if whole
+    ]
+    q = np.concatenate([design.q for design in found]) if whole else None
+    return {
+        "objective": assigned.value,
+        "slit_cost": assigned.value - sum(design.value for design in found) if whole else None,
+        "pieces": int(np.max([counts[kind] for counts in result.pieces()], axis=0).sum()),
+        "slits": _slits(result.kit, kind) / scale * 100,
+        "max_percent": max(deviations, default=None),
+        "outside_percent": None
+        if q is None
+        else 100 * float(np.abs(q - assigned.assignment.realise(result.kit, q)).max()) / scale,
+        "seconds": result.seconds["search"],
+    }
 
 
 def distances(

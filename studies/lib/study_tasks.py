@@ -16,7 +16,7 @@ from kop_exudyn.search.settings import StageSettings
 
 from .kit_search import find_kit
 from .new_design import project_design
-from .slits import slit_kit
+from .slits import optimised_kit, slit_kit
 from .study import Study
 from .sweep import Task
 
@@ -95,6 +95,19 @@ def project_task(
 def slit_task(files: Sequence[Path], parts: int, penalty: float | None) -> dict[str, Any]:
     """See `slit_kit`."""
     return slit_kit([load_design(file) for file in files], parts, penalty)
+
+
+def slit_search_task(
+    files: Sequence[Path],
+    kind: str,
+    parts: int,
+    corners: int,
+    stages: Mapping[str, Any],
+    jobs: int,
+) -> dict[str, Any]:
+    """See `optimised_kit`."""
+    designs = [load_design(file) for file in files]
+    return optimised_kit(designs, kind, parts, corners, StageSettings(**stages), jobs)
 
 
 def changed(stages: StageSettings) -> dict[str, Any]:

@@ -100,6 +100,11 @@ def test_slits_help_and_more_parts_need_shorter_ones(reports):
         )
         assert plain["longest slit %"] == 0
     assert cases[4, 0.01]["mean slit %"] < cases[2, 0.01]["mean slit %"]
+    searched = {(r["kind"], r["parts"]): r for r in data_of(reports, "slit_parts")["optimised"]}
+    slit, plain = searched["slit", 3], searched["linear", 3]
+    assert slit["J"] < plain["J"] == slit["J, plain, as many parts"]
+    assert 0 < slit["of it slits"] < slit["J"] and slit["outside %"] < 1e-6
+    assert plain["longest slit %"] == 0 == plain["of it slits"]
 
 
 def test_a_resumed_study_computes_nothing_again(reports):
