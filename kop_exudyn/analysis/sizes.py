@@ -18,6 +18,7 @@ import numpy as np
 from ..errors import InputError
 from ..kit.kinds import part_kind
 from ..search.checkpoints import NoStore, PrefixedStore, Store
+from ..search.pool import DesignPool
 from ..search.requirements import Requirements
 from ..search.result import KitResult
 from ..search.run import optimize_kit
@@ -105,6 +106,7 @@ class SizedKit:
 
 
 Observer = Callable[[SizedKit], None]
+Examine = Callable[[DesignPool], None]
 
 
 def deviation(result: KitResult) -> float:
@@ -158,6 +160,7 @@ def smallest_kit(
     store: Store | None = None,
     observer: Observer = lambda kit: None,
     announce: Callable[[str], None] = lambda text: None,
+    examine: Examine = lambda pool: None,
 ) -> tuple[SizedKit | None, list[SizedKit]]:
     """The cheapest kit found from which all designs can be built within a deviation.
 
@@ -168,6 +171,7 @@ def smallest_kit(
     accepts : further conditions on a kit
     store : keeps checkpoints of every size, from which an interrupted search goes on
     observer, announce : are told every kit, and what is being done
+    examine : looks at the input designs before the first kit is sought, see `optimize_kit`
 
     From a kit that is good enough, parts of the dearest kind are merged away, a quarter of them at
     first, then fewer, until no kind can do with one part less. A kit that isn't good enough grows
@@ -178,7 +182,7 @@ def smallest_kit(
     """
     if not limit > 0:
         raise InputError("expected a positive deviation in %", field="max_deviation", value=limit)
-    chain = _Chain(designs, settings, store, observer, announce)
+    chain = _Chain(designs, settings, store, observer, announce, examine)
 
     required = settings.stages.requirements
 
@@ -219,15 +223,16 @@ def trade_off(
     store: Store | None = None,
     observer: Observer = lambda kit: None,
     announce: Callable[[str], None] = lambda text: None,
+    examine: Examine = lambda pool: None,
 ) -> list[SizedKit]:
     """Kits of these sizes, the smallest first; no kit deviates more than a smaller one before it.
 
     sizes : kind -> number of parts, from small to large; the largest is searched from scratch, the
         others from the next larger one, and again from the next smaller one where they are worse
-    store, observer, announce : see `smallest_kit`
+    store, observer, announce, examine : see `smallest_kit`
     """
     wanted = [dict(size) for size in sizes]
-    chain = _Chain(designs, settings, store, observer, announce)
+    chain = _Chain(designs, settings, store, observer, announce, examine)
     kits: list[SizedKit] = []
     for size in reversed(wanted):
         kits.insert(0, chain.kit(size, kits[0] if kits else None))
@@ -253,7 +258,9 @@ class _Chain:
         store: Store | None,
         observer: Observer,
         announce: Callable[[str], None],
+        examine: Examine,
     ):
+        self.examine = examine
         self.designs, self.settings = designs, settings
         self.store, self.observer, self.announce = store or NoStore(), observer, announce
         self.kits: list[SizedKit] = []
@@ -275,6 +282,7 @@ class _Chain:
             settings=self.settings,
             store=own,
             announce=lambda phase: self.announce(f"{shown}: {phase}"),
+            examine=(lambda pool: None) if self.kits else self.examine,
         )
         origin = "scratch"
         if before is not None and start is not None:

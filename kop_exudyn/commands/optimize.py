@@ -322,9 +322,10 @@ def _smallest(args: argparse.Namespace, study: Study, parts: dict[str, int]) -> 
             "kit": args.out / "kit.json",
             "within": kept,
             "verdict": list(chosen.result.verdict),
+            "warnings": list(chosen.result.warnings),
             **row,
         },
-        "".join(f"{line}\n" for line in (*chosen.result.verdict, page))
+        "".join(f"{line}\n" for line in (*chosen.result.verdict, *chosen.result.warnings, page))
         + f"{', '.join(f'{n} {kind}' for kind, n in chosen.sizes.items())} parts, largest "
         f"deviation {chosen.max_percent:.3g} %\n",
     )

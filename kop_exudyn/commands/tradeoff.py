@@ -75,5 +75,10 @@ def run(args: argparse.Namespace) -> int:
         progress=not args.quiet,
     )
     page = args.out / "index.html"
-    report(args, {"page": page, "kits": [kit.row(cost) for kit in kits]}, f"{page}\n")
+    warnings = list(kits[0].result.warnings)
+    report(
+        args,
+        {"page": page, "kits": [kit.row(cost) for kit in kits], "warnings": warnings},
+        "".join(f"{line}\n" for line in (*warnings, page)),
+    )
     return 0

@@ -3,6 +3,7 @@ figure and the chosen kit in one folder."""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -12,12 +13,13 @@ from matplotlib.figure import Figure
 
 from ..analysis.sizes import KitCost, SizedKit, smallest_kit, trade_off
 from ..analysis.tradeoff import knee
-from ..analysis.verdict import VerdictSettings
+from ..analysis.verdict import Buildable, VerdictSettings
 from ..drawing.style import save_figure
 from ..files.json_files import plain, write_json
 from ..files.tables import write_csv
 from ..io.checkpoint import Job
 from ..io.run_folder import RunFolder
+from ..search.pool import DesignPool
 from ..search.result import KitResult
 from ..search.run import check_request, described_job, digest
 from ..search.settings import JobSettings
@@ -28,7 +30,9 @@ from .kit_report import write_kit_report
 from .kit_run import progress_bar, within_workshop
 from .page import Page
 from .tradeoff_drawing import draw_tradeoff
-from .verdicts import give_verdicts
+from .verdicts import give_verdicts, given_verdicts, warning_lines
+
+log = logging.getLogger(__name__)
 
 _EXPLAINED = (
     "Deviations of the designs as they open, in % of their targets' sizes: the largest of all "
@@ -80,6 +84,7 @@ def smallest_and_report(
             store=run.folder.store,
             observer=run.tell,
             announce=run.bar.set_description_str,
+            examine=run.examine,
         )
         chosen = found or min(kits, key=lambda kit: kit.max_percent)
         chosen.result.settings = {**chosen.result.settings, **asked}
@@ -139,6 +144,7 @@ def tradeoff_and_report(
             store=run.folder.store,
             observer=run.tell,
             announce=run.bar.set_description_str,
+            examine=run.examine,
         )
         rows = [kit.row(cost) for kit in kits]
         at = knee([row["parts"] for row in rows], [row["max %"] for row in rows])
@@ -186,6 +192,8 @@ class _prepared:
             out, Job.of(plain(job), inputs), resume=resume, overwrite=overwrite
         )
         self._bar = progress_bar(progress)
+        self._required = settings.stages.requirements
+        self._given: list[Buildable] = []
 
     def __enter__(self) -> _prepared:
         self.bar = self._bar.__enter__()
@@ -194,7 +202,16 @@ class _prepared:
     def __exit__(self, *error: Any) -> None:
         self._bar.__exit__(*error)
 
+    def examine(self, pool: DesignPool) -> None:
+        """Say what stops the input designs, and so no kit can mend."""
+        asked = VerdictSettings(safety=self._required.safety)
+        self._given = given_verdicts(pool, asked, self._required)
+        for line in warning_lines(self._given):
+            log.warning("%s", line)
+
     def tell(self, kit: SizedKit) -> None:
+        kit.result.given = [one.to_dict() for one in self._given]
+        kit.result.warnings = warning_lines(self._given)
         self.bar.set_postfix_str(
             f"{' + '.join(map(str, kit.sizes.values()))} parts: {kit.max_percent:.3g} %",
             refresh=False,

@@ -9,6 +9,7 @@ import pytest
 from kop_exudyn.io.datasets import load_designs
 from kop_exudyn.io.results import load_result
 from kop_exudyn.report.kit_run import optimize_and_report
+from kop_exudyn.report.sizes_run import smallest_and_report, tradeoff_and_report
 from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.search.stages import Stages
@@ -75,3 +76,18 @@ def test_result_and_page_tell_it(files, tmp_path):
     page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
     assert "As given, weak: stressed to" in page
     assert page.index("As given, weak") < page.index("<table")
+
+
+@pytest.mark.parametrize("run", ["smallest", "tradeoff"])
+def test_searches_over_sizes_say_it_too(files, tmp_path, monkeypatch, caplog, run):
+    def begin(self):
+        raise Reached
+
+    monkeypatch.setattr(Stages, "direct", begin)
+    asked = {"out": tmp_path / "out", "settings": settings()}
+    with caplog.at_level(logging.WARNING), pytest.raises(Reached):
+        if run == "smallest":
+            smallest_and_report(load_designs(files), 1.0, PARTS, **asked)
+        else:
+            tradeoff_and_report(load_designs(files), [PARTS], **asked)
+    assert sum(message.startswith("As given, weak") for message in caplog.messages) == 1

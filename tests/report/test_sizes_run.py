@@ -63,7 +63,11 @@ def test_a_trade_off_and_what_is_left_of_it_when_killed(tmp_path, monkeypatch):
         tradeoff_and_report(zigzags(), SIZES[1:], **again, resume=True)
 
 
-def test_the_smallest_kit_and_its_report(tmp_path):
+def test_the_smallest_kit_and_its_report(tmp_path, monkeypatch):
+    looked, given = [], sizes_run.given_verdicts
+    monkeypatch.setattr(
+        sizes_run, "given_verdicts", lambda *asked: looked.append(1) or given(*asked)
+    )
     chosen, kept = smallest_and_report(
         zigzags(), 50.0, {"linear": 2, "angular": 1}, out=tmp_path, settings=SETTINGS
     )
@@ -72,7 +76,8 @@ def test_the_smallest_kit_and_its_report(tmp_path):
     assert data["settings"]["max_deviation"] == 50.0 and len(data["kit"]["linear"]) == 1
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "The smallest kit found that keeps every design within 50 %" in page
-    assert len(shown(tmp_path)) == 2
+    assert len(shown(tmp_path)) == 2 and len(looked) == 1  # at the inputs, of both searches
+    assert all(design["input"]["buildable"]["verdict"] for design in data["designs"])
 
 
 @pytest.mark.parametrize("run", ["smallest", "tradeoff"])
