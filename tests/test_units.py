@@ -1,6 +1,7 @@
 """Units: what numbers mean, how they are shown, and files that don't go together."""
 
 import json
+import logging
 
 import numpy as np
 import pytest
@@ -84,6 +85,7 @@ def test_designs_of_different_units_make_no_kit(c_shell_data, write_json_file):
 def test_what_names_no_units_beside_what_does_is_said(
     c_shell_data, write_json_file, monkeypatch, caplog
 ):
+    caplog.set_level(logging.WARNING, "kop_exudyn")
     metres = {"units": {"length": "m", "force": "N"}}
     files = [
         write_json_file("a.json", c_shell_data | {"name": "a"} | metres),

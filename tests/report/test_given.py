@@ -51,13 +51,13 @@ def test_it_is_said_before_the_search(files, tmp_path, monkeypatch, caplog):
         raise Reached
 
     monkeypatch.setattr(Stages, "direct", begin)
-    with caplog.at_level(logging.WARNING), pytest.raises(Reached):
+    with caplog.at_level(logging.WARNING, "kop_exudyn"), pytest.raises(Reached):
         optimize_and_report(load_designs(files), PARTS, out=tmp_path, settings=settings())
     (told,) = [r.getMessage() for r in caplog.records if r.getMessage().startswith("As given")]
     assert told.startswith("As given, weak: stressed to ")
     assert re.search(r"a section [\d.]+ mm instead of 4 mm thick would keep it", told)
     caplog.clear()
-    with caplog.at_level(logging.WARNING), pytest.raises(Reached):
+    with caplog.at_level(logging.WARNING, "kop_exudyn"), pytest.raises(Reached):
         optimize_and_report(
             load_designs(files), PARTS, out=tmp_path / "no", settings=settings(stress=False)
         )
@@ -85,7 +85,7 @@ def test_searches_over_sizes_say_it_too(files, tmp_path, monkeypatch, caplog, ru
 
     monkeypatch.setattr(Stages, "direct", begin)
     asked = {"out": tmp_path / "out", "settings": settings()}
-    with caplog.at_level(logging.WARNING), pytest.raises(Reached):
+    with caplog.at_level(logging.WARNING, "kop_exudyn"), pytest.raises(Reached):
         if run == "smallest":
             smallest_and_report(load_designs(files), 1.0, PARTS, **asked)
         else:
