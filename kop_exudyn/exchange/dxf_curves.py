@@ -178,7 +178,7 @@ def _path_of(entity: Any, label: str) -> Any:
 def _begin(entity: Any) -> str:
     """Where an entity begins, as far as it says so: handles mean nothing to who draws."""
     for name in ("start", "insert", "center"):
-        place = entity.dxf.get(name)
+        place = entity.dxf.get(name) if entity.dxf.is_supported(name) else None
         if place is not None:
             return f" at {_place(place)}"
     return ""
