@@ -26,7 +26,7 @@ _DESCRIPTION = (
 )
 _STATUS = """exit status:
   0    success
-  1    a simulation failed, or a design can't be built from the kit
+  1    a simulation failed: no equilibrium was found
   2    unusable input: one line on standard error says what is wrong
   130  interrupted"""
 _EPILOG = f"""examples:
