@@ -107,13 +107,18 @@ def test_unusable_requests_of_view(run, tmp_path, capsys):
     assert not page.exists()
 
 
+def _export(run, folder):
+    sheet = ("--sheet", "1250,700")  # the longest part is a metre
+    return ["export", *map(str, run), "--unit", "m", *sheet, "--out", str(folder)]
+
+
 @pytest.fixture(scope="module")
 def exported(run, tmp_path_factory):
     """The folder of everything that is exported of the run, and what the command printed."""
     folder = tmp_path_factory.mktemp("export") / "files"
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
-        assert main(["export", *map(str, run), "--unit", "m", "--out", str(folder), "--json"]) == 0
+        assert main([*_export(run, folder), "--json"]) == 0
     return folder, json.loads(printed.getvalue())["files"]
 
 
@@ -140,7 +145,7 @@ def test_export_writes_a_labelled_drawing_of_every_design(run, exported):
 def test_export_overwrites_nothing(run, exported):
     folder, _ = exported
     before = {path: path.read_bytes() for path in folder.rglob("*.*")}
-    assert main(["export", *map(str, run), "--unit", "m", "--out", str(folder)]) == 2
+    assert main(_export(run, folder)) == 2
     assert {path: path.read_bytes() for path in folder.rglob("*.*")} == before
 
 
