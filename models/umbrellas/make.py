@@ -85,7 +85,7 @@ DESIGNS = {
     "oval": Wanted(hexagon(3), lambda x, y: -(x**2) / 2000 - y**2 / 1100, 1400.0),
     "saddle": Wanted(parallelogram(4, 4), lambda x, y: (x**2 - y**2) / 1350, 1400.0),
     "monkey": Wanted(hexagon(3), lambda x, y: (x**3 - 3 * x * y**2) / 2.0e6, 1400.0),
-    "hill": Wanted(triangle(6), lambda x, y: 140 * np.exp(-(x**2 + y**2) / 260**2), 1400.0),
+    "hill": Wanted(triangle(6), lambda x, y: 130 * np.exp(-(x**2 + y**2) / 265**2), 1400.0),
     "wave": Wanted(parallelogram(5, 5), lambda x, y: 60 * np.cos(x / 140) - y**2 / 1800, 1800.0),
 }
 LARGE = {
