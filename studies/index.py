@@ -31,7 +31,7 @@ STORY = (
 
 write_index(
     REPORTS,
-    "A dozen parts, many structures: what kop_exudyn can do, in ten figures",
+    "A dozen parts, many structures: what kop_exudyn can do",
     "Each figure leads to its report: what was tried, on what and with what result, with settings, "
     "versions and times. The program of the same name in the folder studies makes it anew.",
     STORY,
