@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,15 @@ from kop_exudyn.kit.cluster import cluster
 from kop_exudyn.structures.base import design_from_dict
 
 REPOSITORY = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(autouse=True)
+def nothing_is_silenced():
+    """Commands set what is logged, those of fixtures for whole modules too: every test begins with
+    loggers that let everything pass."""
+    logger = logging.getLogger("kop_exudyn")
+    logger.setLevel(logging.NOTSET)
+    logger.propagate, logger.disabled = True, False
 
 
 @pytest.fixture(scope="session")
