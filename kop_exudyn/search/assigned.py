@@ -121,7 +121,7 @@ def opened_stage(
     best = min(found, key=_value)
     others = [other for other in found if other is not best]
     if best is not result:
-        best = _secured(stages, best, numbers)
+        best = _secured(stages, best, numbers, forgiving=not stages.snapping(best))
     return replace(forgiving_stage(stages, best, others, numbers, before), jumps=start.jumps)
 
 
@@ -151,7 +151,7 @@ def forgiving_stage(
     found: list[StageResult] = []
     for other in sorted(others, key=_value):
         if not stages.snapping(other):
-            found.append(_secured(stages, other, numbers))
+            found.append(_secured(stages, other, numbers, forgiving=True))
             break
     steps = best.steps
     for factor in _CALMER if stages.optimises else ():
@@ -163,12 +163,12 @@ def forgiving_stage(
         else:
             opened = stages.weighed(trial)
         if opened.value is not None and not stages.snapping(opened):
-            found.append(_secured(stages, opened, numbers))
+            found.append(_secured(stages, opened, numbers, forgiving=True))
             break
     if not found and before is not None:
         first = stages.secured().kept(before)
         if first.value is not None and not stages.snapping(first):
-            found.append(_secured(stages, first, numbers))
+            found.append(_secured(stages, first, numbers, forgiving=True))
     if not found:
         return replace(best, steps=steps, snapping=lost)
     won = min(found, key=_value)
@@ -176,11 +176,13 @@ def forgiving_stage(
     return replace(won, steps=max(steps, won.steps))
 
 
-def _secured(stages: Stages, best: StageResult, numbers: Iterator[int]) -> StageResult:
+def _secured(
+    stages: Stages, best: StageResult, numbers: Iterator[int], forgiving: bool
+) -> StageResult:
     """Designs in the states that they open into, with the parts optimised once more in steps that
-    keep every design on the branch along which it opens, and forgiving where it is that; as they
-    were where that gains nothing."""
-    secured = stages.secured(forgiving=not stages.snapping(best))
+    keep every design on the branch along which it opens, and forgiving if it is that; as they were
+    where that gains nothing."""
+    secured = stages.secured(forgiving=forgiving)
     best = secured.kept(best)
     if not stages.optimises or best.value is None:
         return best

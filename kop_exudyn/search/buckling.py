@@ -17,7 +17,7 @@ def missed_on_return(
     another stable state keeps to that one, or snaps into a third. The way is straight, in equal
     steps of the parameters.
 
-    Returns the largest distance of a joint, as a share of the bounding box. Raises
+    Returns the largest distance of a joint, as a share of the target's size. Raises
     SimulationFailure when no equilibrium is found on the way.
     """
     end = objective.follow(origin.q, state, steps)[-1]

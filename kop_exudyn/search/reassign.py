@@ -189,7 +189,7 @@ def _sweep(
     q = [part.copy() for part in dataset.split(problem.matrix @ vector)]
     slopes = model.slopes(q)
     parts, variants = list(problem.assignment.part), list(problem.assignment.variant)
-    design_of = np.repeat(np.arange(len(q)), [len(d.groups) for d in dataset.designs])
+    design_of = dataset.group_designs
     offsets = dataset.offsets
     stock, plenty = problem.stock, np.iinfo(np.int64).max // 2
     spare = None if stock is None else stock.spare(problem.assignment, design_of)
@@ -201,16 +201,16 @@ def _sweep(
         if n in frozen or len(group.indices) == 0:
             continue
         ways = part_kind(group.kind).variants_of(group.indices.shape[1])
+        counting = None if count is None else Counting(count, group.kind, int(n))
         if ways.reach is not None:
             if stock is None:
-                count_of = None if count is None else Counting(count, group.kind, int(n))
                 parts[number], variants[number], moved = descend_in_boxes(
                     (q[n], slopes[n], model.hessians[n]),
                     group.indices - offsets[n],
                     (ways, kit[group.kind]),
                     parts[number] * len(ways.names) + variants[number],
                     (model.rounding, model.piece_cost),
-                    count_of,
+                    counting,
                 )
                 changes += moved
             continue
@@ -228,8 +228,8 @@ def _sweep(
             model.rounding,
             n_ways,
         )
-        if count is not None and spare is None:
-            changes += _descend_counted(*state, count, group.kind, int(n), model.piece_cost)
+        if counting is not None and spare is None:
+            changes += _descend_counted(*state, counting, model.piece_cost)
         else:
             changes += _descend(*state, left)
         while spare is not None and _exchange(*state):
@@ -296,24 +296,17 @@ def _descend_numpy(
     n_ways: int,
     left: np.ndarray,
 ) -> int:
-    total, changed = 0, 1
-    while changed:
-        changed = 0
-        for e, own in enumerate(indices):
-            d = candidates - q[own]
-            gains = d @ slope[own] + 0.5 * np.einsum("ci,ij,cj->c", d, hessian[np.ix_(own, own)], d)
-            mine = choice[e] // n_ways
-            gains[np.repeat((left <= 0) & (np.arange(len(left)) != mine), n_ways)] = np.inf
-            which = int(np.argmin(gains))
-            if gains[which] < -least and which != choice[e]:
-                slope += d[which] @ hessian[own]
-                q[own] = candidates[which]
-                left[mine] += 1
-                left[which // n_ways] -= 1
-                choice[e] = which
-                changed += 1
-        total += changed
-    return total
+    """`_descend` where there are no compiled kernels."""
+
+    def prices(mine: int) -> np.ndarray:
+        return np.where((left <= 0) & (np.arange(len(left)) != mine), np.inf, 0.0)
+
+    def moved(mine: int, other: int) -> None:
+        left[mine] += 1
+        left[other] -= 1
+
+    state = (q, slope, hessian, indices, candidates, choice, least, n_ways)
+    return _descend_priced(*state, prices, moved)
 
 
 def _descend_counted(
@@ -325,13 +318,36 @@ def _descend_counted(
     choice: np.ndarray,
     least: float,
     n_ways: int,
-    count: PieceCount,
-    kind: str,
-    design: int,
+    counting: Counting,
     cost: float,
 ) -> int:
     """As `_descend` without a stock, where each piece that has to be made costs; the count of
     pieces is brought up to date as well."""
+
+    def prices(mine: int) -> np.ndarray:
+        return cost * counting.changes(mine)
+
+    state = (q, slope, hessian, indices, candidates, choice, least, n_ways)
+    return _descend_priced(*state, prices, counting.move)
+
+
+def _descend_priced(
+    q: np.ndarray,
+    slope: np.ndarray,
+    hessian: np.ndarray,
+    indices: np.ndarray,
+    candidates: np.ndarray,
+    choice: np.ndarray,
+    least: float,
+    n_ways: int,
+    prices: Callable[[int], np.ndarray],
+    moved: Callable[[int, int], None],
+) -> int:
+    """Coordinate descent, see `_descend`.
+
+    prices : an element's part -> (m,) what each part costs besides, infinite where there is none
+    moved : is told every change, from which part to which
+    """
     total, changed = 0, 1
     while changed:
         changed = 0
@@ -339,12 +355,12 @@ def _descend_counted(
             mine = int(choice[e]) // n_ways
             d = candidates - q[own]
             gains = d @ slope[own] + 0.5 * np.einsum("ci,ij,cj->c", d, hessian[np.ix_(own, own)], d)
-            gains += cost * np.repeat(count.changes(kind, design, mine), n_ways)
+            gains += np.repeat(prices(mine), n_ways)
             which = int(np.argmin(gains))
             if gains[which] < -least and which != choice[e]:
                 slope += d[which] @ hessian[own]
                 q[own] = candidates[which]
-                count.move(kind, design, mine, which // n_ways)
+                moved(mine, which // n_ways)
                 choice[e] = which
                 changed += 1
         total += changed

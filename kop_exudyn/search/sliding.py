@@ -130,6 +130,15 @@ class Counting:
     kind: str
     design: int
 
+    def changes(self, part: int) -> np.ndarray:
+        """(m,) how many pieces more have to be made when an element gets each of the parts instead
+        of its own, `part`."""
+        return self.count.changes(self.kind, self.design, part)
+
+    def move(self, part: int, other: int) -> None:
+        """An element gets another part."""
+        self.count.move(self.kind, self.design, part, other)
+
 
 def descend_in_boxes(
     state: tuple[np.ndarray, np.ndarray, np.ndarray],
@@ -168,8 +177,7 @@ def descend_in_boxes(
             )
             mine = int(choice[e]) // n_ways
             if counting is not None:
-                more = counting.count.changes(counting.kind, counting.design, mine)
-                gains += piece * np.repeat(more, n_ways)
+                gains += piece * np.repeat(counting.changes(mine), n_ways)
             which = int(np.argmin(gains))
             if gains[which] >= gains[choice[e]] - least:
                 which = int(choice[e])
@@ -178,7 +186,7 @@ def descend_in_boxes(
                 q[own] += steps[which]
             if which != choice[e]:
                 if counting is not None:
-                    counting.count.move(counting.kind, counting.design, mine, which // n_ways)
+                    counting.move(mine, which // n_ways)
                 choice[e] = which
                 changed += 1
         total += changed
