@@ -6,13 +6,14 @@ import json
 from pathlib import Path
 
 import pytest
+from support.settings import ONE_STEP
 
 from kop_exudyn.cli import main
 from kop_exudyn.io.datasets import load_designs
 from kop_exudyn.io.results import save_result, save_states
 from kop_exudyn.report.kit_drawings import final_states
 from kop_exudyn.search.run import optimize_kit
-from kop_exudyn.search.settings import JobSettings, StageSettings
+from kop_exudyn.search.settings import JobSettings
 
 
 def test_a_folder_without_a_result_is_named(tmp_path, repository, capsys):
@@ -70,18 +71,10 @@ def test_what_stops_a_kit_from_being_built_is_named_and_can_be_overruled(
         data["material"]["elastic_limit"] = 1e5
         (designs / f"{name}.json").write_text(json.dumps(data))
     run = tmp_path / "run"
-    stages = StageSettings(
-        schedule=(1e4,),
-        relaxed_steps=1,
-        assigned_steps=1,
-        reassignments=0,
-        path_steps=2,
-        effort="quick",
-    )
     result = optimize_kit(
         load_designs(designs),
         {"linear": 6, "angular": 3},
-        settings=JobSettings(jobs=1, baselines=False, stages=stages),
+        settings=JobSettings(jobs=1, baselines=False, stages=ONE_STEP),
     )
     run.mkdir()
     save_result(run / "result.json", result.to_dict())

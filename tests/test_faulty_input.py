@@ -4,7 +4,6 @@ file that is written or changed."""
 from __future__ import annotations
 
 import json
-import logging
 import shutil
 import zipfile
 from pathlib import Path
@@ -64,9 +63,7 @@ def place(tmp_path_factory):
     write("designs/one.json", shell("one"))
     write("study.toml", STUDY + QUICK)
     asked = ["optimize", str(folder / "study.toml"), "--out", str(folder / "run"), "--jobs", "1"]
-    level = logging.getLogger("kop_exudyn").level
     assert cli.main([*asked, "--quiet"]) == 0
-    logging.getLogger("kop_exudyn").setLevel(level)
     (folder / "empty").mkdir()
     for name, content in {
         "blank.json": "",

@@ -12,13 +12,14 @@ import meshio
 import numpy as np
 import pytest
 from pypdf import PdfReader
+from support.settings import ONE_STEP
 
 from kop_exudyn.cli import main
 from kop_exudyn.io.datasets import load_designs
 from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.report.kit_run import optimize_and_report
 from kop_exudyn.report.viewer_scenes import kit_scene
-from kop_exudyn.search.settings import JobSettings, StageSettings
+from kop_exudyn.search.settings import JobSettings
 
 
 def shell(name: str, bow: float) -> dict:
@@ -47,19 +48,11 @@ def run(tmp_path_factory):
         (folder / "designs" / f"{name}.json").write_text(
             json.dumps(shell(name, bow)), encoding="utf-8"
         )
-    stages = StageSettings(
-        schedule=(1e4,),
-        relaxed_steps=1,
-        assigned_steps=1,
-        reassignments=0,
-        path_steps=2,
-        effort="quick",
-    )
     optimize_and_report(
         load_designs(folder / "designs", ["flat", "bent"]),
         {"linear": 2, "angular": 2},
         out=folder / "run",
-        settings=JobSettings(jobs=1, stages=stages),
+        settings=JobSettings(jobs=1, stages=ONE_STEP),
     )
     return folder / "run", folder / "designs"
 

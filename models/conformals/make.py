@@ -54,10 +54,14 @@ def design(name: str, image: Map, opening: float) -> dict:
     at_joints = np.array([line[::POINTS_PER_SPAN] for line in lines])
     scale = SPAN / np.abs(np.diff(at_joints, axis=1)).mean()
     centre = at_joints[:JOINTS].mean()
-    curves = [
-        {"type": "spline", "points": rounded(scale * (line - centre)), "closed": False}
-        for line in lines
-    ]
+    return shell(name, [scale * (line - centre) for line in lines], opening)
+
+
+def shell(name: str, curves: Sequence[np.ndarray], opening: float) -> dict:
+    """The content of the design file of a C-shell.
+
+    curves : points of each, complex, m; opening : change of the mean joint angle, rad
+    """
     return {
         "format": "kop_exudyn/design",
         "version": 1,
@@ -66,7 +70,9 @@ def design(name: str, image: Map, opening: float) -> dict:
         "units": {"length": "m", "force": "N"},
         "material": MATERIAL,
         "section": SECTION,
-        "curves": curves,
+        "curves": [
+            {"type": "spline", "points": rounded(curve), "closed": False} for curve in curves
+        ],
         "crossings": "find",
         "free_ends": False,
         "rod_offset": 0.0,
@@ -87,12 +93,16 @@ def write(folder: Path) -> list[Path]:
     files = []
     for number, (name, (image, opening)) in enumerate(MAPS.items(), 1):
         path = folder / f"{number:02d}_{name}.json"
-        content = design(name, image, opening)
-        curves = ",\n  ".join(json.dumps(curve) for curve in content.pop("curves"))
-        head = json.dumps(content, indent=1)
-        path.write_text(f'{head[:-2]},\n "curves": [\n  {curves}\n ]\n}}\n', encoding="utf-8")
-        files.append(path)
+        files.append(write_design(path, design(name, image, opening)))
     return files
+
+
+def write_design(path: Path, content: dict) -> Path:
+    """Write a design file with a line for every curve; returns it."""
+    curves = ",\n  ".join(json.dumps(curve) for curve in content.pop("curves"))
+    head = json.dumps(content, indent=1)
+    path.write_text(f'{head[:-2]},\n "curves": [\n  {curves}\n ]\n}}\n', encoding="utf-8")
+    return path
 
 
 def utilisations(file: Path) -> dict[str, float]:

@@ -14,7 +14,6 @@ wide   15 x 15 curves
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -23,7 +22,7 @@ import numpy as np
 import shapely
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "conformals"))
-from make import MATERIAL, SECTION, SPAN, rounded, utilisations  # noqa: E402
+from make import SPAN, shell, utilisations, write_design  # noqa: E402
 
 PER_SPAN = 4  # points of a curve between neighbouring joints
 Map = Callable[[np.ndarray], np.ndarray]
@@ -120,37 +119,12 @@ def design(name: str) -> dict:
     spans = np.concatenate([np.abs(np.diff(line[::PER_SPAN])) for line in bent])
     scale = SPAN / spans.mean()
     centre = np.concatenate([line[::PER_SPAN] for line in bent]).mean()
-    return {
-        "format": "kop_exudyn/design",
-        "version": 1,
-        "class": "c_shell",
-        "name": name,
-        "units": {"length": "m", "force": "N"},
-        "material": MATERIAL,
-        "section": SECTION,
-        "curves": [
-            {"type": "spline", "points": rounded(scale * (line - centre)), "closed": False}
-            for line in bent
-        ],
-        "crossings": "find",
-        "free_ends": False,
-        "rod_offset": 0.0,
-        "opening": {"angle": opening, "side": "up"},
-        "elements_per_piece": 2,
-    }
+    return shell(name, [scale * (line - centre) for line in bent], opening)
 
 
 def write(folder: Path, names: Sequence[str] = tuple(PATCHES)) -> list[Path]:
     """Write the designs; returns their files."""
-    files = []
-    for name in names:
-        path = folder / f"{name}.json"
-        content = design(name)
-        curves = ",\n  ".join(json.dumps(curve) for curve in content.pop("curves"))
-        head = json.dumps(content, indent=1)
-        path.write_text(f'{head[:-2]},\n "curves": [\n  {curves}\n ]\n}}\n', encoding="utf-8")
-        files.append(path)
-    return files
+    return [write_design(folder / f"{name}.json", design(name)) for name in names]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -3,10 +3,9 @@ thickness that carries a load."""
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
+from support.grids import coarse_grid
 
 from kop_exudyn.analysis.load_check import carrying_thickness, check_load, critical_factor
 from kop_exudyn.equilibrium.path import PathOptions, trace_path
@@ -23,12 +22,7 @@ MIDDLE = 12
 @pytest.fixture(scope="module")
 def data(repository):
     """A dome of five lamellas each way."""
-    path = repository / "models" / "grids" / "01_dome.json"
-    found = json.loads(path.read_text(encoding="utf-8"))
-    del found["straightened"]  # of all curves
-    for axis in "uv":
-        found["network"][axis] = found["network"][axis][::2]
-    return found
+    return coarse_grid(repository, "01_dome", 0)
 
 
 @pytest.fixture(scope="module")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.grids import coarse_grid
 
 from kop_exudyn.analysis.verdict import Buildable, VerdictSettings, judge
 from kop_exudyn.errors import InputError, SimulationFailure
@@ -21,12 +21,7 @@ FEW = VerdictSettings(samples=2)
 
 @pytest.fixture(scope="module")
 def data(repository):
-    path = repository / "models" / "grids" / "05_free_form.json"
-    found = json.loads(path.read_text(encoding="utf-8"))
-    del found["straightened"]  # of all curves
-    for axis in "uv":
-        found["network"][axis] = found["network"][axis][1::2]
-    return found
+    return coarse_grid(repository)
 
 
 def built(data):
@@ -106,11 +101,7 @@ def test_a_load_that_it_cannot_carry(data):
 
 
 def test_a_load_that_makes_it_give_way(repository):
-    path = repository / "models" / "grids" / "01_dome.json"
-    data = json.loads(path.read_text(encoding="utf-8"))
-    del data["straightened"]  # of all curves
-    for axis in "uv":
-        data["network"][axis] = data["network"][axis][::2]
+    data = coarse_grid(repository, "01_dome", 0)
     case = {"points": [{"joint": 12, "force": [0, 0, -10]}], "factor": 3.0}
     verdict = judge(*built({**data, "load_cases": [case]}), settings=replace(FEW, samples=0))
     (stop,) = verdict.stops

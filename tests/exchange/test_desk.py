@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import rhino3dm
 import trimesh
+from support.settings import ONE_STEP
 
 from kop_exudyn.analysis.simulation import simulate
 from kop_exudyn.errors import InputError
@@ -23,7 +24,7 @@ from kop_exudyn.exchange.gltf import glb_bytes
 from kop_exudyn.exchange.states import states_of_kit, states_of_simulation
 from kop_exudyn.fabrication.pieces import parts_list_of
 from kop_exudyn.search.run import optimize_kit
-from kop_exudyn.search.settings import JobSettings, StageSettings
+from kop_exudyn.search.settings import JobSettings
 from kop_exudyn.structures.loads import LoadCase
 from kop_exudyn.units import Units
 
@@ -33,15 +34,7 @@ MM = Units("mm", "N")
 @pytest.fixture(scope="module")
 def result(shells):
     """One accepted step a stage: the files don't need more."""
-    stages = StageSettings(
-        schedule=(1e4,),
-        relaxed_steps=1,
-        assigned_steps=1,
-        reassignments=0,
-        path_steps=2,
-        effort="quick",
-    )
-    settings = JobSettings(jobs=1, baselines=False, stages=stages)
+    settings = JobSettings(jobs=1, baselines=False, stages=ONE_STEP)
     return optimize_kit(shells, {"linear": 3, "angular": 2}, settings=settings)
 
 

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from support.settings import ONE_STEP
 
 from kop_exudyn.errors import InputError
 from kop_exudyn.files.arrays import load_arrays, save_arrays, unsealed
@@ -12,7 +13,7 @@ from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.report.kit_drawings import final_states, histories, stage_rows, summary_rows
 from kop_exudyn.search.result import STAGES
 from kop_exudyn.search.run import optimize_kit
-from kop_exudyn.search.settings import JobSettings, StageSettings
+from kop_exudyn.search.settings import JobSettings
 from kop_exudyn.search.stage_results import Jump
 from kop_exudyn.structures.fitting import TargetFitting
 
@@ -20,19 +21,11 @@ from kop_exudyn.structures.fitting import TargetFitting
 @pytest.fixture(scope="module")
 def finished(shells, tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
-    stages = StageSettings(
-        schedule=(1e4,),
-        relaxed_steps=1,
-        assigned_steps=1,
-        reassignments=0,
-        path_steps=2,
-        effort="quick",
-    )
     events = []
     result = optimize_kit(
         shells,
         {"linear": 3, "angular": 2},
-        settings=JobSettings(jobs=1, baselines=False, stages=stages),
+        settings=JobSettings(jobs=1, baselines=False, stages=ONE_STEP),
         observer=events.append,
     )
     result.stages["direct"].jumps.append(Jump(shells[0].name, 0.5, 0.07))

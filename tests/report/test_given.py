@@ -5,6 +5,7 @@ import logging
 import re
 
 import pytest
+from support.grids import coarse_grid
 
 from kop_exudyn.io.datasets import load_designs
 from kop_exudyn.io.results import load_result
@@ -20,11 +21,7 @@ PARTS = {"linear": 2, "angular": 1}
 @pytest.fixture(scope="module")
 def files(repository, tmp_path_factory):
     """A sound grid, and the same with a section twice as thick as its limit lets it be."""
-    path = repository / "models" / "grids" / "05_free_form.json"
-    data = json.loads(path.read_text(encoding="utf-8"))
-    del data["straightened"]  # of all curves
-    for axis in "uv":
-        data["network"][axis] = data["network"][axis][1::2]
+    data = coarse_grid(repository)
     folder = tmp_path_factory.mktemp("designs")
     for name, limit in (("sound", 4e7), ("weak", 4e6)):  # at 20 and 202 % of it
         content = {**data, "name": name, "material": {**data["material"], "elastic_limit": limit}}

@@ -8,6 +8,7 @@ import re
 from html import unescape
 
 import pytest
+from support.grids import coarse_grid
 
 from kop_exudyn.analysis.verdict import Buildable, Stop
 from kop_exudyn.cli import main
@@ -21,12 +22,7 @@ from kop_exudyn.structures.strength import design_strength
 @pytest.fixture(scope="module")
 def data(repository):
     """A grid of four lamellas each way."""
-    path = repository / "models" / "grids" / "05_free_form.json"
-    found = json.loads(path.read_text(encoding="utf-8"))
-    del found["straightened"]  # of all curves
-    for axis in "uv":
-        found["network"][axis] = found["network"][axis][1::2]
-    return found
+    return coarse_grid(repository)
 
 
 STUDY = """format = "kop_exudyn/study"

@@ -11,6 +11,7 @@ from html import unescape
 
 import numpy as np
 import pytest
+from support.settings import ONE_STEP
 
 from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.io.datasets import load_designs
@@ -26,7 +27,7 @@ from kop_exudyn.report.viewer import (
 )
 from kop_exudyn.report.viewer_scenes import design_scene, kit_scene, opening_path
 from kop_exudyn.search.run import optimize_kit
-from kop_exudyn.search.settings import JobSettings, StageSettings
+from kop_exudyn.search.settings import JobSettings
 from kop_exudyn.structures.base import design_from_dict
 
 SECTION = np.array([[0.1, 0.1], [-0.1, 0.1], [-0.1, -0.1], [0.1, -0.1]])
@@ -93,18 +94,10 @@ def shell(name, bow):
 @pytest.fixture(scope="module")
 def result():
     designs = [shell("flat", 0.1), shell("bent", 0.16)]
-    stages = StageSettings(
-        schedule=(1e4,),
-        relaxed_steps=1,
-        assigned_steps=1,
-        reassignments=0,
-        path_steps=2,
-        effort="quick",
-    )
     return optimize_kit(
         designs,
         {"linear": 2, "angular": 2},
-        settings=JobSettings(jobs=1, baselines=False, stages=stages),
+        settings=JobSettings(jobs=1, baselines=False, stages=ONE_STEP),
     )
 
 

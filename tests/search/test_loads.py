@@ -1,8 +1,7 @@
 """Kits whose designs carry their loads: bounds of the search, and the verdict where none does."""
 
-import json
-
 import pytest
+from support.grids import coarse_grid
 
 from kop_exudyn.analysis.load_check import check_load
 from kop_exudyn.analysis.verdict import VerdictSettings, judge
@@ -21,12 +20,7 @@ SUPPORTS = [0, 3, 12, 15]
 
 @pytest.fixture(scope="module")
 def data(repository):
-    path = repository / "models" / "grids" / "05_free_form.json"
-    found = json.loads(path.read_text(encoding="utf-8"))
-    del found["straightened"]  # of all curves
-    for axis in "uv":
-        found["network"][axis] = found["network"][axis][1::2]
-    return found
+    return coarse_grid(repository)
 
 
 def loaded(data, **limit):

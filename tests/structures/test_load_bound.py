@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from support.grids import coarse_grid
 
 from kop_exudyn.analysis.load_check import check_load
 from kop_exudyn.equilibrium.sensitivities import Sensitivities
@@ -25,11 +26,10 @@ SOFT = {**CASE, "points": [{"joint": 5, "force": [0, 0, -0.05]}]}
 
 def design(repository, file, case):
     path = repository / "models" / file
-    data = json.loads(path.read_text(encoding="utf-8"))
-    if "network" in data:  # a coarser grid is as good
-        del data["straightened"]  # of all curves
-        for axis in "uv":
-            data["network"][axis] = data["network"][axis][1::2]
+    if path.parent.name == "grids":  # a coarser one is as good
+        data = coarse_grid(repository, path.stem)
+    else:
+        data = json.loads(path.read_text(encoding="utf-8"))
     return design_from_dict({**data, "load_cases": [case]})
 
 
@@ -95,11 +95,7 @@ def test_derivatives_are_exact_where_supports_move_along(loaded, monkeypatch):
 
 def test_a_load_that_makes_it_give_way(repository):
     case = {"name": "snow", "points": [{"joint": 12, "force": [0, 0, -10]}], "factor": 3.0}
-    path = repository / "models" / "grids" / "01_dome.json"
-    data = json.loads(path.read_text(encoding="utf-8"))
-    del data["straightened"]  # of all curves
-    for axis in "uv":
-        data["network"][axis] = data["network"][axis][::2]
+    data = coarse_grid(repository, "01_dome", 0)
     own = design_from_dict({**data, "load_cases": [case]})
     state = DesignObjective(own).reference.equilibria["deployed"]
     bound = LoadBound(own, own.load_cases[0], state)

@@ -3,11 +3,11 @@ against designs that are made with it from the start."""
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 
 import numpy as np
 import pytest
+from support.grids import coarse_grid
 
 from kop_exudyn.rods.sections import circle, drilled, general, half_lapped, rectangle, thickened
 from kop_exudyn.structures.base import design_from_dict
@@ -51,12 +51,7 @@ def test_other_sections_keep_their_breadth():
 
 @pytest.fixture
 def data(repository):
-    path = repository / "models" / "grids" / "05_free_form.json"
-    found = json.loads(path.read_text(encoding="utf-8"))
-    del found["straightened"]  # of all curves
-    for axis in "uv":
-        found["network"][axis] = found["network"][axis][1::2]
-    return found
+    return coarse_grid(repository)
 
 
 def with_limit(data, limit, thickness=None):
