@@ -17,17 +17,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from kop_exudyn.report.designs import draw_designs
-from kop_exudyn.report.kit_drawings import drawn_stages
 from kop_exudyn.search.result import KitResult
-from lib.comparison import (
-    DEVIATIONS_SHOWN,
-    STAGES_SHOWN,
-    comparison_rows,
-    draw_comparison,
-    finding,
-    most_changed,
-)
+from lib.comparison import Row, comparison_rows, finding
+from lib.comparison_page import begin, realised, show
 from lib.study import Study
 from lib.study_kits import data_sets, kits_of
 
@@ -40,50 +32,33 @@ def main() -> None:
     study = Study.from_command_line(__doc__, __file__)
     cases = data_sets(ROOT / "models", ROOT.parent / "shared" / "data" / "umbrella", study.quick)
     results: dict[str, KitResult] = {}
+    rows: list[Row] = []
     for case in cases:  # the kits are kept in the folder of runs, the report after every set
         results |= kits_of(study, [case])
-        write(study, results, [case.name for case in cases if case.name not in results])
+        rows += comparison_rows(case.name, results[case.name])
+        write(study, results, rows, [case.name for case in cases if case.name not in results])
 
 
-def write(study: Study, results: Mapping[str, KitResult], missing: Sequence[str]) -> None:
+def write(
+    study: Study, results: Mapping[str, KitResult], rows: Sequence[Row], missing: Sequence[str]
+) -> None:
     """The report on the sets that have been done; missing : names of the others."""
     # 1. What came out, design by design and in a few sentences.
-    rows = [row for name, result in results.items() for row in comparison_rows(name, result)]
     outcome = finding(rows)
     if missing:
         outcome += f" Not run yet: {', '.join(missing)}."
-    report = study.report(outcome)
-    report.figure(
-        "deviations",
-        draw_comparison(rows),
-        STAGES_SHOWN,
-        alt="Deviation of all designs: inputs, baselines and both stages",
-    )
-    report.table(
-        "designs",
-        [{key: row[key] for key in row if not key.endswith("energy")} for row in rows],
-        DEVIATIONS_SHOWN,
-    )
+    report = begin(study, rows, outcome)
 
     # 2. The designs, set by set.
     for name, result in results.items():
-        sizes = " and ".join(f"{count} {kind}" for kind, count in result.kit.sizes.items())
-        elements = sum(design.n_elements for design in result.designs)
         joints = [len(design.joints) for design in result.designs]
         report.section(
             name,
-            f"{sizes} parts realise {elements} elements of {len(result.designs)} designs of "
-            f"{min(joints)} to {max(joints)} joints; the search took {result.wall_s / 60:.0f} min. "
-            + " ".join(result.verdict),
+            f"{realised(result)} of {min(joints)} to {max(joints)} joints; the search took "
+            f"{result.wall_s / 60:.0f} min. {' '.join(result.verdict)}",
         )
-        report.figure(
-            name.replace(" ", "_"),
-            draw_designs(most_changed(drawn_stages(result, COLUMNS), SHOWN)),
-            "Equilibria at their best placement on the target; grey: the input design. Joints are "
-            f"coloured by their deviation. Of {len(result.designs)} designs those that direct "
-            "projection leaves farthest off are shown.",
-            alt=f"The {name} after direct projection and with the kit found here",
-        )
+        alt = f"The {name} after direct projection and with the kit found here"
+        show(report, name, result, COLUMNS, SHOWN, alt)
     report.save({"finding": outcome, "designs": rows})
 
 

@@ -17,17 +17,9 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from kop_exudyn.report.designs import draw_designs
-from kop_exudyn.report.kit_drawings import drawn_stages
 from kop_exudyn.search.result import STAGES
-from lib.comparison import (
-    DEVIATIONS_SHOWN,
-    STAGES_SHOWN,
-    comparison_rows,
-    draw_comparison,
-    finding,
-    most_changed,
-)
+from lib.comparison import comparison_rows, finding
+from lib.comparison_page import begin, realised, show
 from lib.study import Study
 from lib.study_kits import kits_of, three_classes
 
@@ -45,18 +37,7 @@ def main() -> None:
     # 2. What came out, design by design and in a sentence.
     rows = [row for name, result in results.items() for row in comparison_rows(name, result)]
     outcome = finding(rows)
-    report = study.report(outcome)
-    report.figure(
-        "deviations",
-        draw_comparison(rows),
-        STAGES_SHOWN,
-        alt="Deviation of all designs: inputs, baselines and both stages",
-    )
-    report.table(
-        "designs",
-        [{key: row[key] for key in row if not key.endswith("energy")} for row in rows],
-        DEVIATIONS_SHOWN,
-    )
+    report = begin(study, rows, outcome)
     report.table(
         "energies",
         [
@@ -68,21 +49,9 @@ def main() -> None:
 
     # 3. The designs themselves, class by class.
     for name, result in results.items():
-        sizes = " and ".join(f"{count} {kind}" for kind, count in result.kit.sizes.items())
-        elements = sum(design.n_elements for design in result.designs)
-        report.section(
-            name, f"{sizes} parts realise {elements} elements of {len(result.designs)} designs."
-        )
-        report.figure(
-            name.replace(" ", "_"),
-            draw_designs(most_changed(drawn_stages(result, STAGES), SHOWN)),
-            "Equilibria at their best placement on the target; grey: the input design. Joints are "
-            "coloured "
-            f"by their deviation. Of {len(result.designs)} designs those that direct projection "
-            f"leaves "
-            "farthest off are shown.",
-            alt=f"The {name} after direct projection, unrelaxed, relaxed and assigned",
-        )
+        report.section(name, f"{realised(result)}.")
+        alt = f"The {name} after direct projection, unrelaxed, relaxed and assigned"
+        show(report, name, result, STAGES, SHOWN, alt)
     report.save({"finding": outcome, "designs": rows})
 
 

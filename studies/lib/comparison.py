@@ -22,18 +22,6 @@ from kop_exudyn.search.result import STAGES, KitResult
 Row = Mapping[str, Any]
 
 ORDER = ("input", *STAGES)
-STAGES_SHOWN = (
-    "Largest deviation of every design, logarithmic. Input: before any kit. Published, opened: the "
-    "state that the designs of the published method open into. Assigned: the kit found here. A "
-    "cross at the right: no equilibrium was found, or Exudyn didn't confirm it. A ring: it buckled "
-    "into another state: led back to the elements of the input, it doesn't come back to the "
-    "input's shape."
-)
-DEVIATIONS_SHOWN = (
-    "Deviations of the joints in % of the size. Utilisation: the largest of all states, of the "
-    "elastic limit. Snapped: of the samples with the workshop's errors, those that end in another "
-    "state. Failed: no equilibrium was found."
-)
 _COLOURS = {
     "input": QUIET,
     "direct": PALETTE["vermillion"],

@@ -91,9 +91,9 @@ def write_index(folder: str | Path, title: str, lead: str, story: Sequence[Chapt
     if not pages:
         raise InputError("holds no reports", source=folder)
     told = [
-        replace(entry_of(pages[one.name], one.picture), title=one.headline)
+        replace(entry, title=one.headline)
         for one in story
-        if one.name in pages and _made(pages[one.name])
+        if one.name in pages and (entry := entry_of(pages[one.name], one.picture)).made
     ]
     rest = [entry_of(path) for name, path in pages.items() if name not in {e.name for e in told}]
     others, old = [e for e in rest if e.made], [e for e in rest if not e.made]

@@ -1,0 +1,75 @@
+"""The pages on which inputs, baselines and both stages are compared: what they begin with, and the
+designs that gain most."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from kop_exudyn.report.designs import draw_designs
+from kop_exudyn.report.kit_drawings import drawn_stages
+from kop_exudyn.search.result import KitResult
+
+from .comparison import Row, draw_comparison, most_changed
+from .study import Study, StudyReport
+
+_STAGES = (
+    "Largest deviation of every design, logarithmic. Input: before any kit. Published, opened: the "
+    "state that the designs of the published method open into. Assigned: the kit found here. A "
+    "cross at the right: no equilibrium was found, or Exudyn didn't confirm it. A ring: it buckled "
+    "into another state: led back to the elements of the input, it doesn't come back to the "
+    "input's shape."
+)
+_DEVIATIONS = (
+    "Deviations of the joints in % of the size. Utilisation: the largest of all states, of the "
+    "elastic limit. Snapped: of the samples with the workshop's errors, those that end in another "
+    "state. Failed: no equilibrium was found."
+)
+
+
+def begin(study: Study, rows: Sequence[Row], finding: str) -> StudyReport:
+    """A report that begins with its finding, and with all designs in a figure and a table.
+
+    rows : see `comparison_rows`
+    """
+    report = study.report(finding)
+    report.figure(
+        "deviations",
+        draw_comparison(rows),
+        _STAGES,
+        alt="Deviation of all designs: inputs, baselines and both stages",
+    )
+    report.table(
+        "designs",
+        [{key: row[key] for key in row if not key.endswith("energy")} for row in rows],
+        _DEVIATIONS,
+    )
+    return report
+
+
+def realised(result: KitResult) -> str:
+    """Which parts realise how many elements, without a full stop."""
+    sizes = " and ".join(f"{count} {kind}" for kind, count in result.kit.sizes.items())
+    elements = sum(design.n_elements for design in result.designs)
+    return f"{sizes} parts realise {elements} elements of {len(result.designs)} designs"
+
+
+def show(
+    report: StudyReport,
+    name: str,
+    result: KitResult,
+    stages: Sequence[str],
+    shown: int,
+    alt: str,
+) -> None:
+    """Pictures of the designs of a kit that direct projection leaves farthest off.
+
+    stages : a column each; shown : how many designs, a row each
+    """
+    report.figure(
+        name.replace(" ", "_"),
+        draw_designs(most_changed(drawn_stages(result, stages), shown)),
+        "Equilibria at their best placement on the target; grey: the input design. Joints are "
+        f"coloured by their deviation. Of {len(result.designs)} designs those that direct "
+        "projection leaves farthest off are shown.",
+        alt=alt,
+    )
