@@ -88,23 +88,28 @@ def robustness(
     evaluation: Evaluation,
     tolerance: Tolerance,
     factors: Sequence[float],
-    number: int,
+    samples: int | Sequence[int],
     seed: int = 0,
 ) -> dict[str, Any]:
     """What errors of several sizes do to a design, by sensitivities and by sampling; plain data.
 
-    factors : multiples of the tolerance; number : samples for each Of each size: root mean square
-    and worst joint's displacement, predicted and sampled; the fit's largest deviations; how many
-    samples failed, how many snapped, and how many of them Exudyn was asked to confirm and did;
-    `linear_error`, the part of the displacements that their
-    own prediction misses, of the samples that kept to the state.
+    factors : multiples of the tolerance
+    samples : of each of them, one number for all or one each
+
+    Of each size: root mean square and worst joint's displacement, predicted and sampled; the fit's
+    largest deviations; how many samples failed, how many snapped, and how many of them Exudyn was
+    asked to confirm and did; `linear_error`, the part of the displacements that their own
+    prediction misses, of the samples that kept to the state.
+
+    Raises ValueError if there are not as many numbers of samples as factors.
     """
     sizes = []
-    for factor in factors:
+    numbers = [samples] * len(factors) if isinstance(samples, int) else samples
+    for factor, number in zip(factors, numbers, strict=True):
         scaled = tolerance.scaled(factor)
         predicted = predicted_spread(design, evaluation, scaled)
-        samples = sample_spread(design, evaluation, scaled, number, seed)
-        found = [sample for sample in samples if sample.displacements is not None]
+        tried = sample_spread(design, evaluation, scaled, number, seed)
+        found = [sample for sample in tried if sample.displacements is not None]
         entry: dict[str, Any] = {
             "factor": factor,
             "predicted_rms_percent": predicted.rms_percent,
@@ -115,7 +120,7 @@ def robustness(
             "snapped": sum(sample.snapped for sample in found),
         }
         if found:
-            sampled = sampled_spread(samples, evaluation.fit.size)
+            sampled = sampled_spread(tried, evaluation.fit.size)
             entry |= {
                 "sampled_rms_percent": sampled.rms_percent,
                 "sampled_worst_percent": sampled.worst_percent,

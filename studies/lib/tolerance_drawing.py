@@ -28,12 +28,13 @@ def robustness_of_run(
     share: float,
     angle: float,
     factors: Sequence[float],
-    samples: int,
+    samples: Sequence[int],
 ) -> dict[str, Any]:
     """Robustness of all assigned designs of a finished run, with what is needed to draw them.
 
     run : its result.json; files : of its designs
     share, angle : standard deviations, of lengths as a share of the median one, of angles in rad
+    factors : multiples of them; samples : of each factor
     """
     result = load_run(run.parent, [load_design(file) for file in files])
     found = []
@@ -126,6 +127,7 @@ def table_rows(classes: Mapping[str, Sequence[Found]]) -> list[dict[str, Any]]:
                     * sum(s for kind, s in found["shares"].items() if kind != "angular"),
                     "planned max %": found["planned_max_percent"],
                     "95 % below %": float(np.quantile(deviations, 0.95)) if deviations else None,
+                    "samples": size["samples"],
                     "snapped": size["snapped"],
                     "failed": size["failed"],
                 }
