@@ -77,7 +77,7 @@ def main() -> None:
     report.figure(
         "map",
         draw_map(cases),
-        "Largest deviation of the joints at the parts, % of the box, before these are tuned. "
+        "Largest deviation of the joints at the parts, % of the size, before these are tuned. "
         "Framed: a snap, and how far the joint jumped. Far off without a frame: the design got "
         "there in several steps, none of which stands out, so the watch on the path alone doesn't "
         "tell.",

@@ -19,13 +19,13 @@ from .objective import Evaluation
 # A joint that moves this much further in one step of the path than in the steps around it has
 # snapped.
 _JUMP_FACTOR = 6.0
-_JUMP_SHARE = 0.01  # of the bounding box; smaller moves are no snap whatever their ratio
+_JUMP_SHARE = 0.01  # of the size; smaller moves are no snap whatever their ratio
 
 
 @dataclass(frozen=True)
 class Jump:
     """A snap on the path to the parts: which design, at which fraction of the way, how far (share
-    of the box)."""
+    of the size)."""
 
     design: str
     fraction: float

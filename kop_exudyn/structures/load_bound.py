@@ -32,7 +32,7 @@ from .stress_bound import MOST_ROWS, NEAR, Rows, StressBound
 
 GIVES_WAY = 10.0  # utilisation that stands for a state that is not there
 _STEPS = 3  # to the largest factor
-_FAR = 0.02  # of the box: a step that moves more has to lead back to where it began
+_FAR = 0.02  # of the size: a step that moves more has to lead back to where it began
 # a design that gives way finds no other state here: it doesn't carry the load
 _NO_SADDLES = NewtonOptions(escapes=0, soften=False, max_iterations=60)
 

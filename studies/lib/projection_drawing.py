@@ -38,7 +38,7 @@ def draw_projection(rows: Sequence[Mapping[str, Any]]) -> Figure:
         for ax, key in ((fit, "direct max %"), (energy, "direct energy ratio")):
             if rows[0][key] is not None:
                 ax.axhline(rows[0][key], color=QUIET, linestyle=":", label="direct")
-        fit.set(title="Fidelity", ylabel="largest deviation, % of box", yscale="log")
+        fit.set(title="Fidelity", ylabel="largest deviation, % of the size", yscale="log")
         energy.set(title="Elastic energy", ylabel="relative to the input design's", yscale="log")
         kinds = [key.removesuffix(" distance %") for key in rows[0] if key.endswith(" distance %")]
         for kind, form, colour in zip(kinds, ("o-", "s-", "^-"), ("blue", "vermillion", "green")):

@@ -132,7 +132,7 @@ def finding_of(cases: Sequence[Case]) -> str:
     if shown is None or not shown["snapped"]:
         return text
     text += (
-        f" With {_in_words(shown)} a joint jumps {shown['snap %']:.0f} % of the box at "
+        f" With {_in_words(shown)} a joint jumps {shown['snap %']:.0f} % of the size at "
         f"{shown['snap at']:.0%} of the way, and the design ends {shown['at the parts %']:.1f} % "
         "off"
     )
@@ -170,8 +170,8 @@ def label(case: Case) -> str:
 def draw_paths(cases: Sequence[Case]) -> Figure:
     """Movement in each step, deviation and energy along the path, one line a case."""
     fields = {
-        "moves %": "largest move of a joint\nin one step, % of the box",
-        "deviations %": "largest deviation from\nthe target, % of the box",
+        "moves %": "largest move of a joint\nin one step, % of the size",
+        "deviations %": "largest deviation from\nthe target, % of the size",
         "energies": "elastic energy, relative\nto the input design's",
     }
     with style():

@@ -46,11 +46,11 @@ def draw_slits(rows: Sequence[Mapping[str, Any]]) -> Figure:
             title="Projection energy", ylabel="relative to squared median length", yscale="log"
         )
         slit.set(title="Optimal slit length", ylabel="mean, % of median length", ylim=(0, None))
-        fit.set(title="Fidelity", ylabel="largest deviation, % of box", yscale="log")
+        fit.set(title="Fidelity", ylabel="largest deviation, % of the size", yscale="log")
         gain.set(
             title="Fidelity against slit length",
             xlabel="mean slit length, % of median length",
-            ylabel="largest deviation, % of box",
+            ylabel="largest deviation, % of the size",
             yscale="log",
         )
         for ax in (energy, slit, fit):
