@@ -340,7 +340,9 @@ def _solved_elastic(
     t = model.excess(x[: model.region.n])[bounds]
     m, free = rows.rows, elastic.g.size - z.size
     result = solver.solve(
-        elastic, (np.append(x, t), np.append(y, np.zeros(m)), np.append(z, np.zeros(free)))
+        elastic,
+        (np.append(x, t), np.append(y, np.zeros(m)), np.append(z, np.zeros(free))),
+        interior_point=True,
     )
     if result.status != "solved":
         return None, np.zeros(0)
@@ -370,24 +372,29 @@ def _solved_by_dual(
     rows = model.bounds
     if inverse is None or rows is None:
         return None
-    m, wide = rows.rows, np.zeros((rows.rows, qp.g.size))
+    wide = np.zeros((rows.rows, qp.g.size))
     wide[:, : model.region.n] = rows.jacobian.toarray()
+    # a row that no step changes never pushes where it is met: as an unknown of no curvature it
+    # would spoil the scale of all others
+    pushing = (rows.value > 0) | wide.any(axis=1)
+    wide, value = wide[pushing], rows.value[pushing]
     free, columns = inverse(-qp.g), inverse(wide.T)
-    bounds, number = np.unique(rows.bound, return_inverse=True)
-    b = len(bounds)
+    bounds, number = np.unique(rows.bound[pushing], return_inverse=True)
+    m, b = len(value), len(bounds)
     curvature = sp.block_diag([wide @ columns, np.eye(b) / model.penalty], format="csc")
     sums = sp.csr_matrix((np.ones(m), (number, np.arange(m))), shape=(b, m))
     unlimited = np.full(m + b, np.inf)
     dual = solver.solve(
         QP(
             sp.csc_matrix(curvature),
-            np.append(-(wide @ free) - rows.value, np.zeros(b)),
+            np.append(-(wide @ free) - value, np.zeros(b)),
             sp.csr_matrix(sp.hstack([sums, -sp.identity(b)])),
             np.full(b, -np.inf),
             np.full(b, model.penalty),
             np.zeros(m + b),
             unlimited,
-        )
+        ),
+        interior_point=True,  # many rows of few parameters: OSQP takes 100 times longer, or stalls
     )
     if dual.status != "solved":
         return None
@@ -398,8 +405,8 @@ def _solved_by_dual(
         np.all(x >= qp.lb) and np.all(x <= qp.ub) and np.all(row >= qp.lo) and np.all(row <= qp.hi)
     ):
         return None
-    pressure = np.zeros(bounds.max() + 1)
-    np.add.at(pressure, rows.bound, y)
+    pressure = np.zeros(rows.bound.max() + 1)
+    np.add.at(pressure, rows.bound[pushing], y)
     nothing = np.zeros(qp.lo.size), np.zeros(qp.g.size)
     wall_s = time.perf_counter() - began
     return replace(dual, x=x, y=nothing[0], z=nothing[1], wall_s=wall_s), pressure

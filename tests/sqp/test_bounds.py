@@ -118,7 +118,7 @@ def test_the_dual_subproblem_has_the_elastic_ones_solution(monkeypatch):
     )
     derivatives = Derivatives(generator.standard_normal(n), hessian, inequalities=bounds)
     region = Region(np.full(n, -5.0), np.full(n, 5.0), LinearConstraints.none(n), np.ones(n))
-    model = build_model(np.zeros(n), derivatives, hessian, region, 3.0)
+    model = build_model(np.zeros(n), derivatives, hessian, region, 0.7)
     start = np.zeros(0), np.zeros(n)
     by_dual = minimise_model(model, np.inf, QPSolver(), start)
     monkeypatch.setattr(model_module, "_solved_by_dual", lambda *arguments: None)
@@ -127,6 +127,17 @@ def test_the_dual_subproblem_has_the_elastic_ones_solution(monkeypatch):
     assert np.allclose(by_dual.pressure, whole.pressure, atol=1e-5)
     assert by_dual.predicted == pytest.approx(whole.predicted, rel=1e-8)
     assert model.excess(by_dual.u).max() > 0  # some of the bounds had to give way
+
+
+def test_a_row_that_no_step_changes_spoils_no_scale():
+    """|x| <= 1 seen from its centre: no slope. The other bound alone holds the step."""
+    problem = Disc()
+    derivatives = problem.derivatives(Point(np.zeros(2), 5.0))
+    region = Region(problem.lower, problem.upper, problem.constraints, np.ones(2))
+    model = build_model(np.zeros(2), derivatives, derivatives.hessian, region, 20.0)
+    step = minimise_model(model, np.inf, QPSolver(), (np.zeros(0), np.zeros(2)))
+    assert step.u == pytest.approx([0.5, 1.0], abs=1e-9)
+    assert step.pressure == pytest.approx([0.0, 3.0], abs=1e-8)
 
 
 def test_points_without_bounds_need_none():
