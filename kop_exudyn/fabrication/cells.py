@@ -41,15 +41,20 @@ class ArmPart:
     """Arms of one length and one sort: "a", both pins on one face, or "b", on opposite ones.
 
     label : as "C1 top a"
-    count : arms for the neediest design
+    by_design : arms of each design
     length : from pin to pin along the arm, mm
     offsets : of the pins from the arm's axis, mm
     """
 
     label: str
-    count: int
+    by_design: tuple[int, ...]
     length: float
     offsets: tuple[float, float]
+
+    @property
+    def count(self) -> int:
+        """Arms for the neediest design."""
+        return max(self.by_design)
 
 
 @dataclass(frozen=True)
@@ -116,17 +121,16 @@ class CellParts:
 
     @cached_property
     def arms(self) -> tuple[ArmPart, ...]:
-        """Arms by part, length and sort, as many as the neediest design needs."""
-        needed: Counter[tuple] = Counter()
-        for counts in self.counts:
-            needed |= counts
+        """Arms by part, length and sort."""
         found = []
-        for (kind, part, name, opposite), count in sorted(needed.items()):
+        for sort in sorted(set().union(*self.counts)):
+            kind, part, name, opposite = sort
             label = f"{self.parts.labels[kind][part]} {name} {'b' if opposite else 'a'}"
             column = self._columns(kind).index(name)
             length = self.scale * float(self.parts.kit.parts[kind][part, column])
             side = self.thickness / 2
-            found.append(ArmPart(label, count, length, (-side, side if opposite else -side)))
+            by_design = tuple(counts[sort] for counts in self.counts)
+            found.append(ArmPart(label, by_design, length, (-side, side if opposite else -side)))
         return tuple(found)
 
     @cached_property
@@ -187,7 +191,8 @@ class CellParts:
         label = f"{arm.label}{number}"
         shapes.append(Text(np.array([length / 2, 0.0]), height, label))
         name = f"{length:.1f} from pin to pin"
-        return Template(label, name, arm.count, tuple(shapes), round(self.width / 2, 6))
+        board = round(self.width / 2, 6)
+        return Template(label, name, arm.count, tuple(shapes), board, arm.by_design)
 
     def _plate(self) -> Template:
         """A plate, seen from outside: a triangle, on each edge a notch for arm and ear, and the
@@ -217,7 +222,8 @@ class CellParts:
         shapes: list[Shape] = [_outline(shape), *map(_outline, slots)]
         shapes.append(Text(np.zeros(2), min(0.3 * inradius, 5.0), "P"))
         name = f"edge {edge:.1f}, hinge pins along the edges at the inner face"
-        return Template("P", name, self.plates, tuple(shapes), t)
+        by_design = tuple(h.plates for h in self.hardware)
+        return Template("P", name, self.plates, tuple(shapes), t, by_design)
 
     def _ear_at(self) -> float:
         """Place of an ear's middle along a plate's edge: beside the arm, on the edge's middle's
@@ -239,7 +245,8 @@ class CellParts:
             Hole(np.zeros(2), self.pin),
             Text(np.array([-1.6 * t, -0.38 * t]), 0.45 * t, "E"),
         )
-        return Template("E", "hinge beside an arm", self.hinges, shapes, t)
+        by_design = tuple(len(h.arms) for h in self.hardware)
+        return Template("E", "hinge beside an arm", self.hinges, shapes, t, by_design)
 
 
 def _round(centre: np.ndarray, radius: float) -> shapely.Polygon:

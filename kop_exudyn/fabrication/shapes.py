@@ -95,6 +95,7 @@ class Template:
     count : pieces to cut for the whole kit
     shapes : in mm, anywhere
     thickness : of the board, mm
+    by_design : pieces that each design needs, where that isn't the part's own count
     """
 
     label: str
@@ -102,6 +103,7 @@ class Template:
     count: int
     shapes: tuple[Shape, ...]
     thickness: float
+    by_design: tuple[int, ...] = ()
 
     @property
     def box(self) -> np.ndarray:

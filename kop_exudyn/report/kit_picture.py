@@ -32,7 +32,9 @@ _SLENDERNESS = 250  # size over breadth of rods that have no section of their ow
 _ANGLE, _RISE, _AZIMUTH = np.radians(26), np.radians(24), -1.0  # of the camera
 _HANDY = (1.0, 2.0, 5.0)  # lengths of scale bars, times powers of ten
 _BAR = 0.32  # of the plan's larger side: at most as long
-_TALL, _SMALL = 0.8, 0.03  # times a design's size: a person beside it is neither larger nor smaller
+# Times a design's size. A person beside it is neither smaller nor larger: one as tall as the design
+# would take the picture from it, and the scale bar says as much.
+_TALL, _SMALL = 0.45, 0.03
 _FINE, _COARSE = Light(suns=5, skies=15, buffer=600), Light(suns=1, skies=1, buffer=200)
 _FILLED = 0.82  # of the picture, by what is in it
 _UP = np.array([0.0, 0.0, 1.0])

@@ -16,7 +16,7 @@ from ..io.kits import save_kit
 from ..io.results import save_result, save_states
 from ..kit.kinds import part_kind
 from ..search.result import KitResult
-from ..units import unit_of
+from ..units import in_millimetres, unit_of
 from .designs import draw_designs
 from .environment import environment
 from .history import draw_history
@@ -38,6 +38,7 @@ from .verdicts import stopped, verdict_lines, verdict_rows
 from .viewer import save_viewer
 from .viewer_scenes import kit_scene
 
+_FRAMES = 6  # states on the way to the opening in the viewer
 _LEGEND = (
     "Opens within: how far from the state shown the design ends that its assembly opens into, % of "
     "the target's size. Utilisation: the largest equivalent stress over the elastic limit in all "
@@ -75,7 +76,7 @@ def write_kit_report(
     }
     for name, figure in figures.items():
         save_figure(figure, folder / name, overwrite=True)
-    save_viewer(folder / "viewer.html", kit_scene(result), overwrite=True)
+    save_viewer(folder / "viewer.html", kit_scene(result, frames=_FRAMES), overwrite=True)
     pictures = kit_pictures(result)
     names = [design.name for design in result.designs]
     write_bytes(folder / "picture.png", joined(pictures, names), overwrite=True)
@@ -104,8 +105,9 @@ def _page(
     )
     if verdicts:
         first, second = verdict_lines(verdicts, result.units)
-        page = Page(title, first)
-        page.text("\n\n".join([second] if _all_possible(verdicts) else _stops(verdicts)))
+        possible = _all_possible(verdicts)
+        page = Page(title, f"{first.removesuffix('.')}: {_outcome(result)}" if possible else first)
+        page.text("\n\n".join([second] if possible else _stops(verdicts)))
     else:
         page = Page(title, about)
     if result.warnings:
@@ -197,6 +199,15 @@ def _parts(page: Page, result: KitResult) -> None:
 
 def _all_possible(verdicts: Sequence[Buildable]) -> bool:
     return all(verdict.possible for verdict in verdicts)
+
+
+def _outcome(result: KitResult) -> str:
+    """Of how many parts, and how far off the worst design is at most."""
+    sizes = " and ".join(f"{count} {kind}" for kind, count in result.kit.sizes.items())
+    fits = [result.summary("assigned", n)["fit"] for n in range(len(result.designs))]
+    percent = max(fit["max_percent"] for fit in fits)
+    length = in_millimetres(max(fit["max"] for fit in fits), result.units)
+    return f"{sizes} parts keep every joint within {percent:.2g} % ({length}) of its target."
 
 
 def _stops(verdicts: Sequence[Buildable]) -> list[str]:

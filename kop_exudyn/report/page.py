@@ -199,8 +199,9 @@ def _card(card: Card) -> str:
         for name, value, bad in card.lines
     )
     return (
-        f'<article>{image}<h3>{escape(card.title)} <span class="badge {kind}">'
-        f"{escape(card.badge)}</span></h3><dl>{lines}</dl></article>"
+        f'<article><div class="card">{image}<div class="text"><h3>{escape(card.title)} '
+        f'<span class="badge {kind}">{escape(card.badge)}</span></h3><dl>{lines}</dl>'
+        "</div></div></article>"
     )
 
 

@@ -67,11 +67,13 @@ def _drawn(shapes: Iterable[Template], parts: PartsList) -> Iterable[PartDrawing
     widest = max(float(template.size[0]) for template in shapes)
     for template in shapes:
         kind, k = of_label.get(template.label, ("", 0))
-        colour = colours[kind][k] if kind else np.array(_NEUTRAL)
+        # what is made for one part, such as a cell's arms, has its label before its own name
+        of_part = of_label.get(template.label.split(" ")[0])
+        colour = colours[of_part[0]][of_part[1]] if of_part else np.array(_NEUTRAL)
         scale = _WIDEST / widest if widest > 0 else 1.0
         width, height = template.size
         scale = max(scale, min(_WIDEST / width, _LEAST / height)) if height and width else scale
-        counts = tuple(int(n) for n in parts.counts[kind][:, k]) if kind else ()
+        counts = tuple(int(n) for n in parts.counts[kind][:, k]) if kind else template.by_design
         yield PartDrawing(
             template.label,
             template.name,

@@ -125,8 +125,10 @@
       if (size > best * 1.001) { best = size; columns = c; }
     }
     const rows = Math.ceil(n / columns);
-    tiles = shown().map((design, k) => ({design, x: w * (k % columns) / columns, y: h * Math.floor(k / columns) / rows,
-                                         w: w / columns, h: h / rows}));
+    tiles = shown().map((design, k) => {  // the last row's tiles share all of its width
+      const row = Math.floor(k / columns), across = row < rows - 1 ? columns : n - columns * (rows - 1);
+      return {design, x: w * (k % columns) / across, y: h * row / rows, w: w / across, h: h / rows};
+    });
     $("labels").replaceChildren(...tiles.map(label));
   }
 

@@ -158,7 +158,7 @@ class Study:
 
     def report(self, outcome: str) -> StudyReport:
         """The report's beginning: what was found; then what was tried, and on what."""
-        return StudyReport(self, Page(self.title, outcome).text(self.about))
+        return StudyReport(self, Page(self.title, outcome).text(self.about), outcome)
 
     @contextmanager
     def _progress(self, total: int) -> Iterator[tqdm]:
@@ -175,10 +175,11 @@ class Study:
 @dataclass
 class StudyReport:
     """A report that is filled from top to bottom; its figures and tables are files beside the page
-    as well."""
+    as well. What was found stands in its data, too, from where the page of all reports has it."""
 
     study: Study
     page: Page
+    finding: str = ""
 
     def section(self, heading: str, text: str = "") -> StudyReport:
         self.page.section(heading, text)
@@ -235,6 +236,7 @@ class StudyReport:
             {
                 "study": study.title,
                 "quick": study.quick,
+                "finding": self.finding,
                 **data,
                 "settings": settings,
                 "times": times,

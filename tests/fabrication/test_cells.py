@@ -28,6 +28,16 @@ def parts(hill):
     return parts_list(found.kit, found.assignment, [hill])
 
 
+def test_pieces_of_every_design_add_up(hill, parts):
+    """Two boards an arm, a hinge an arm, as many plates as the mesh has; by design as in all."""
+    found = Blanks(parts, "mm").cells.templates()
+    boards = sum(t.by_design[0] for t in found if t.label not in ("P", "E"))
+    counts = {t.label: t.by_design for t in found}
+    assert boards == 2 * len(hill.hardware.arms) == 2 * counts["E"][0]
+    assert counts["P"] == (hill.hardware.plates,)
+    assert all(t.count == max(t.by_design) for t in found)
+
+
 def holes(template):
     return [shape for shape in template.shapes if isinstance(shape, Hole)]
 

@@ -43,11 +43,12 @@ def test_a_design_fills_its_picture_at_any_size(length):
 
 
 def test_a_person_stands_beside_what_is_large_enough():
-    """The same picture but for the person: at 6 m there is one, at 0.6 m none."""
-    tall, small = (
-        dark(picture(bar(length), Units("m"), 200, 150, fine=False)) for length in (6.0, 0.6)
+    """The same picture but for the person: at 6 m there is one; at 2.7 and 0.6 m, where it would
+    take the picture from the design, none."""
+    tall, shell, small = (
+        dark(picture(bar(length), Units("m"), 200, 150, fine=False)) for length in (6.0, 2.7, 0.6)
     )
-    assert tall > small + 100
+    assert tall > small + 100 and abs(shell - small) < 50
 
 
 def test_the_scale_bar_has_its_length():

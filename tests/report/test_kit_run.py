@@ -102,7 +102,7 @@ def test_the_page_begins_with_pictures_and_parts(finished):
     page = (out / "index.html").read_text(encoding="utf-8")
     cards, parts = page.index('<div class="cards">'), page.index("<h2>The parts</h2>")
     assert page.index("<h1>") < cards < parts < page.index("<table>")
-    assert page[cards:parts].count("<article><img") == len(result.designs)
+    assert page[cards:parts].count('<article><div class="card"><img') == len(result.designs)
     for n, design in enumerate(result.designs):
         fit = result.summary("assigned", n)["fit"]
         assert f"<h3>{design.name} " in page and f"at most {fit['max_percent']:.2g} %" in page

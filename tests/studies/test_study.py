@@ -76,6 +76,7 @@ def test_a_report_leaves_page_figures_tables_and_data(tmp_path):
     rows = list(csv.DictReader((out / "squares.csv").read_text().splitlines()))
     assert [float(row["square"]) for row in rows] == [1, 4, 9]
     data = json.loads((out / "data.json").read_text())
+    assert data["finding"] == "They grow."
     assert data["squares"]["square 2"] == {"square": 4} and data["environment"]["cores"] >= 1
     assert data["settings"]["square 3"]["settings"] == {"x": 3} and data["times"]["wall_s"] > 0
 
