@@ -85,6 +85,8 @@ def _without_doubles(
 ) -> tuple[list[DrawnCurve], list[Finding]]:
     """Without curves that lie on another one all along; of two that lie on each other the later one
     goes."""
+    if not curves:
+        return [], []
     lines = [shapely.LineString(_outline(curve)) for curve in curves]
     lengths = np.array([line.length for line in lines])
     tree = shapely.STRtree(lines)

@@ -1,14 +1,18 @@
-"""Curves from drawings: the polylines of an OBJ file; what a DXF file draws, see `dxf_curves`."""
+"""Curves from drawings: the polylines and splines of an OBJ file; what a DXF file draws, see
+`dxf_curves`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+
+import numpy as np
 
 from ..errors import InputError
 from ..files.files import read_bytes
-from ..geometry.obj_files import parse_obj
-from .drawing import Drawing, DrawnCurve
+from ..geometry.nurbs import spline_points
+from ..geometry.obj_files import ObjContent, parse_obj
+from .drawing import SAG, Drawing, DrawnCurve
 from .dxf_curves import dxf_drawing
 
 _SIZE_LIMIT = 64 * 2**20  # bytes: nets have some thousand points
@@ -39,7 +43,8 @@ def read_drawing(path: str | Path, layers: Sequence[str] = ()) -> Drawing:
     except InputError as error:
         raise error.at(path) from None
     if not drawing.curves:
-        skipped = f" ({'; '.join(drawing.skipped)})" if drawing.skipped else ""
+        said = [*drawing.skipped, *drawing.doubts]
+        skipped = f" ({'; '.join(said)})" if said else ""
         raise InputError(f"contains no curves{skipped}", source=path)
     if len(drawing.curves) > _MOST_CURVES:
         raise InputError(
@@ -50,17 +55,38 @@ def read_drawing(path: str | Path, layers: Sequence[str] = ()) -> Drawing:
 
 
 def _obj_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
-    """The `l` elements of an OBJ file."""
-    found = parse_obj(content.decode("utf-8", errors="replace"))
+    """The `l` and `curv` elements of an OBJ file."""
+    found = parse_obj(content)
     curves = []
     for picked, line in found.lines:
         closed = len(picked) > 3 and picked[0] == picked[-1]
         points = found.vertices[picked[: len(picked) - closed]]
         curves.append(DrawnCurve(points, closed, f"line {line}"))
+    curves += _free_forms(found)
     skipped = [f"{n} {name} elements" for name, n in found.left_out.items()]
     if found.faces:
         skipped.append(f"{len(found.faces)} faces, which are a surface's")
     return Drawing(curves, skipped=skipped)
+
+
+def _free_forms(found: ObjContent) -> Iterator[DrawnCurve]:
+    """The curves in free form, by points. Raises InputError naming the line."""
+    if not found.curves:
+        return
+    used = [n for picked, _ in found.lines for n in picked]
+    used += [n for curve in found.curves for n in curve.picked]
+    size = float(np.linalg.norm(np.ptp(found.vertices[used], axis=0))) if used else 0.0
+    for curve in found.curves:
+        control = found.vertices[curve.picked]
+        weights = found.weights[curve.picked].tolist() if curve.rational else None
+        try:
+            points = spline_points(
+                control, curve.knots, curve.degree, weights, SAG * size, curve.between
+            )
+        except InputError as error:
+            raise InputError(error.message, field=f"line {curve.line}") from None
+        closed = len(points) > 3 and np.linalg.norm(points[0] - points[-1]) <= 1e-9 * size
+        yield DrawnCurve(points[: len(points) - closed], bool(closed), f"line {curve.line}")
 
 
 CURVE_READERS: dict[str, Callable[[bytes, Sequence[str]], Drawing]] = {

@@ -7,6 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+# of a drawing's size: how far points of arcs and splines may leave them between each other
+SAG = 1e-4
+
 
 @dataclass(frozen=True)
 class DrawnCurve:
@@ -30,12 +33,14 @@ class Drawing:
     unit : name of its unit of length, where the file says so
     metres : of one unit of length, where the file says so
     skipped : what was left out, in words
+    doubts : what looks wrong with the file, in words
     """
 
     curves: list[DrawnCurve]
     unit: str | None = None
     metres: float | None = None
     skipped: Sequence[str] = field(default_factory=list)
+    doubts: Sequence[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,13 @@ from .curve_files import read_drawing
 from .drawing import Drawing, DrawnCurve, Finding, size_of
 from .frames import Frame, frame_of
 from .joins import join_ends
+from .suspicions import (
+    narrow_loops,
+    refuse_stray_heights,
+    refuse_strays,
+    rounded_corners,
+    without_bolts,
+)
 
 _FAR = 20.0  # sizes from the origin beyond which a drawing is moved there
 _DIGITS = 9  # of the size, that points are written with
@@ -137,6 +144,7 @@ def drawn_network(
         raise InputError("all points are the same")
     tolerance = options.tolerance * size
     findings = [Finding("skipped", text) for text in drawing.skipped]
+    findings += [Finding("suspicious", text) for text in drawing.doubts]
     # drawings in planes of their own have origins of their own
     standard = frame_of(drawing.curves, size).standard
     points = np.concatenate([curve.points for curve in drawing.curves])
@@ -144,9 +152,11 @@ def drawn_network(
     origin = far_origin(points) if standard else np.zeros(3)
     near = [replace(curve, points=curve.points - origin) for curve in drawing.curves]
     curves, done = cleaned(near, tolerance)
-    if not curves:
-        raise InputError("contains no curves that are longer than the tolerance")
+    if 2 * len(curves) < len(near):
+        refuse_strays(drawing.curves, tolerance, size)
     frame = frame_of(curves, size)
+    if not frame.flat:
+        refuse_stray_heights(curves, tolerance)
     if not frame.flat and not space:
         extent = np.ptp(np.concatenate([c.points for c in curves]), axis=0)
         raise InputError(
@@ -158,11 +168,15 @@ def drawn_network(
         where = f"turned by {np.degrees(frame.tilt):.3g}° against the xy plane"
         findings.append(Finding("cleaned", f"the drawing's plane, {where}, is laid flat"))
     flat = [frame(curve.points)[:, :2] for curve in curves]
+    curves, flat, bolts = without_bolts(curves, flat, size)
+    done += [*bolts, *narrow_loops(curves, flat)]
     joined = join_ends(
         curves, crossing_pieces(curves, flat, tolerance, size), tolerance, options.join
     )
     curves, ends = _ends_on_curves(joined.curves, frame, options, tolerance)
     findings += [*done, *_about_joins(joined), *ends]
+    if options.kind == "spline":
+        findings += rounded_corners(curves)
     entries = [_entry(curve, frame, options, size) for curve in curves]
     return DrawnNetwork(drawing, options, curves, frame, entries, findings, origin)
 

@@ -1,26 +1,27 @@
 """The curves of a DXF file's model space, in world coordinates, blocks included.
 
-Read is what can be seen: not layers that are off or frozen, not entities that are hidden, not the
-layer Defpoints, which never prints. Layers that are asked for by name are read in any case.
+Read is what can be seen: not layers that are off or frozen, not entities that are hidden or in a
+hidden block, not the layer Defpoints, which never prints. Layers that are asked for by name are
+read in any case. What can't be read is named: blocks of other files, texts, solids.
 """
 
 from __future__ import annotations
 
 import io
+import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..fabrication.dxf import load_ezdxf
-from ..files.documents import LARGEST
-from .drawing import Drawing, DrawnCurve
+from .drawing import SAG, Drawing, DrawnCurve
+from .dxf_outlines import Outline, outline_of, place_of
 
 _DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE", "SPLINE", "ARC", "CIRCLE", "ELLIPSE")
-# of the drawing's size: how far points of arcs and splines may leave them between each other
-_SAG = 1e-4
 _BINARY = b"AutoCAD Binary DXF"
 _DEEPEST = 20  # blocks within blocks
 _MOST_ENTITIES = 200_000
@@ -33,25 +34,58 @@ _UNITS = {
     5: ("cm", 1e-2),
     6: ("m", 1.0),
     7: ("km", 1e3),
+    8: ("microinches", 2.54e-8),
+    9: ("mils", 2.54e-5),
     10: ("yards", 0.9144),
+    11: ("ångströms", 1e-10),
+    12: ("nanometres", 1e-9),
     13: ("micrometres", 1e-6),
     14: ("dm", 0.1),
+    15: ("decametres", 10.0),
+    16: ("hectometres", 100.0),
+    17: ("gigametres", 1e9),
+    18: ("astronomical units", 149_597_870_700.0),
+    19: ("light years", 9_460_730_472_580_800.0),
+    20: ("parsecs", 648_000 / np.pi * 149_597_870_700.0),
     21: ("US survey feet", 1200 / 3937),
+    22: ("US survey inches", 100 / 3937),
+    23: ("US survey yards", 3600 / 3937),
+    24: ("US survey miles", 5280 * 1200 / 3937),
 }
+# what the names of codes begin with, under which entities are left out as damaged
+_LOST = ("REMOVED_INVALID_GRAPHIC", "REMOVED_ENTITY", "UNDEFINED_BLOCK", "INVALID_SPLINE")
+_END = re.compile(rb"EOF\s*\0?\s*$")
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """An entity, as its block or the model space has it.
+
+    matrix : from there into the drawing's coordinates; None: they are the drawing's
+    layer : that it is seen on
+    label : what messages call it
+    invisible : whether it, or a block that it is of, is hidden
+    """
+
+    entity: Any
+    matrix: Any
+    layer: str
+    label: str
+    invisible: bool
 
 
 def dxf_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
     """The drawing in a DXF file's bytes. Raises InputError for what can't be read, and for layers
     that aren't there."""
-    document = _document(load_ezdxf(), content)
+    document, doubts = _document(load_ezdxf(), content)
     space = document.modelspace()
     wanted = {name.lower() for name in layers}
     frozen = {layer.dxf.name.lower() for layer in document.layers if layer.is_frozen()}
     entities = list(_exploded(space, frozen))
-    known = {layer for _, layer, _ in entities} | {layer.dxf.name for layer in document.layers}
+    known = {e.layer for e in entities} | {layer.dxf.name for layer in document.layers}
     for layer in layers:
         if layer.lower() not in {name.lower() for name in known}:
-            used = sorted({layer for _, layer, _ in entities})
+            used = sorted({e.layer for e in entities})
             raise InputError(
                 f"no such layer (there are {', '.join(used) or 'none'})",
                 field="layer",
@@ -60,31 +94,47 @@ def dxf_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
     hidden = set() if layers else _hidden_layers(document)
     unseen: Counter[str] = Counter()
     others: Counter[str] = Counter()
+    elsewhere: Counter[str] = Counter()
     drawn = []
-    for entity, layer, label in entities:
-        if wanted and layer.lower() not in wanted:
+    for e in entities:
+        if wanted and e.layer.lower() not in wanted:
             continue
-        if layer.lower() in hidden or entity.dxf.get("invisible", 0) and not wanted:
-            unseen[layer] += 1
-        elif entity.dxftype() not in _DRAWN or _is_mesh(entity):
-            others[entity.dxftype() + (" mesh" if _is_mesh(entity) else "")] += 1
+        if e.layer.lower() in hidden or e.invisible and not wanted:
+            unseen[e.layer] += 1
+        elif e.entity.dxftype() == "INSERT":
+            elsewhere[e.entity.dxf.name] += 1
+        elif e.entity.dxftype() not in _DRAWN or _is_mesh(e.entity):
+            others[e.entity.dxftype() + (" mesh" if _is_mesh(e.entity) else "")] += 1
         else:
-            drawn.append((_path_of(entity, label), label))
+            drawn.append((outline_of(e.entity, e.label, e.matrix), e.label))
     skipped = [
         f"{n} on the hidden layer {layer} (--layer {layer} reads them)"
         for layer, n in unseen.items()
     ]
+    skipped += [
+        f"{n} insertions of {name}, a block of another file: bind it to this one, or import that "
+        "file"
+        for name, n in elsewhere.items()
+    ]
     if others:
         skipped.append("no curves: " + ", ".join(f"{n} {name}" for name, n in others.items()))
-    empty = sum(path is None for path, _ in drawn)
+    empty = sum(outline is None for outline, _ in drawn)
     if empty:
         skipped.append(f"{empty} curves of a single point")
-    name, metres = _UNITS.get(document.header.get("$INSUNITS", 0), (None, None))
-    paths = [(path, label) for path, label in drawn if path is not None]
-    return Drawing(list(_flattened(paths)), name, metres, skipped)
+    if not _END.search(content):
+        doubts.append("the file has no end (EOF): it may be cut off, and curves missing")
+    code = document.header.get("$INSUNITS", 0)
+    name, metres = _UNITS.get(code, (None, None))
+    if name is None and code != 0:
+        doubts.append(f"its unit of length has the number {code}, which isn't known: give --scale")
+    outlines = [(outline, label) for outline, label in drawn if outline is not None]
+    return Drawing(list(_flattened(outlines)), name, metres, skipped, doubts)
 
 
-def _document(ezdxf: Any, content: bytes) -> Any:
+def _document(ezdxf: Any, content: bytes) -> tuple[Any, list[str]]:
+    """The document, and in words what was left out of it as damaged."""
+    from ezdxf.audit import AuditError
+
     try:
         if content.startswith(_BINARY):
             from ezdxf.document import Drawing as Document
@@ -95,12 +145,17 @@ def _document(ezdxf: Any, content: bytes) -> Any:
         else:
             from ezdxf import recover
 
+            if b"\n" not in content:  # lines as old Macintosh programs end them
+                content = content.replace(b"\r", b"\n")
             document, auditor = recover.read(io.BytesIO(content))
     except Exception as error:  # its readers raise whatever the broken file leads them to
         raise InputError(f"can't be read as DXF: {str(error)[:100]}") from None
     if auditor.has_errors:
         raise InputError(f"damaged DXF file: {auditor.errors[0].message}")
-    return document
+    lost = [fix.message for fix in auditor.fixes if AuditError(fix.code).name.startswith(_LOST)]
+    if not lost:
+        return document, []
+    return document, [f"{len(lost)} damaged entities are left out: {lost[0].rstrip('.')}"]
 
 
 def _hidden_layers(document: Any) -> set[str]:
@@ -114,94 +169,71 @@ def _hidden_layers(document: Any) -> set[str]:
 def _exploded(
     entities: Any,
     frozen: set[str],
-    outer: str = "0",
+    outer: _Placed | None = None,
     within: str = "",
     depth: int = 0,
     count: list[int] | None = None,
-) -> Iterator[tuple[Any, str, str]]:
-    """Entities with their layers and labels; those of inserted blocks instead of the insertions.
+) -> Iterator[_Placed]:
+    """Entities with their layers and labels; those of inserted blocks instead of the insertions,
+    but for those of blocks of other files.
 
     What lies on layer 0 of a block is on the layer that the block is inserted on, and so is all of
-    it where that layer is frozen.
+    it where that layer is frozen; and all of it is hidden where the insertion is. Blocks within
+    stretched and turned ones are sheared, so the maps of all insertions are multiplied: an
+    insertion alone can't say that.
+
+    outer : the insertion whose block the entities are of
     """
     count = [0] if count is None else count
     for entity in entities:
+        if entity.dxftype() == "ATTDEF":  # a form, which insertions fill in
+            continue
         count[0] += 1
         if count[0] > _MOST_ENTITIES:
             raise InputError(f"draws more than {_MOST_ENTITIES:,} entities, blocks included")
         # entities that only the drawing's program knows have no layer
         own = entity.dxf.layer if entity.dxf.is_supported("layer") else ""
-        layer = outer if within and (own == "0" or outer.lower() in frozen) else own
-        if entity.dxftype() != "INSERT":
-            handle = entity.dxf.handle
-            yield entity, layer, f"{entity.dxftype()} {handle or count[0]}{within}"
+        of_outer = outer is not None and (own == "0" or outer.layer.lower() in frozen)
+        placed = _Placed(
+            entity,
+            None if outer is None else outer.matrix,
+            outer.layer if outer is not None and of_outer else own,
+            f"{entity.dxftype()} {entity.dxf.handle or count[0]}{within}",
+            bool(entity.dxf.get("invisible", 0)) or outer is not None and outer.invisible,
+        )
+        if entity.dxftype() != "INSERT" or _elsewhere(entity):
+            yield placed
             continue
         if depth == _DEEPEST:
             raise InputError(f"has blocks within blocks, more than {_DEEPEST} deep")
         name = f" of block {entity.dxf.name}"
         for single in entity.multi_insert() if entity.mcount > 1 else (entity,):
-            yield from _exploded(_content(single), frozen, layer, name, depth + 1, count)
+            matrix = single.matrix44()
+            matrix = matrix if placed.matrix is None else matrix * placed.matrix
+            inner = replace(placed, matrix=matrix)
+            yield from _exploded(entity.block(), frozen, inner, name, depth + 1, count)
 
 
-def _content(insert: Any) -> list[Any]:
-    """What an inserted block draws, in the coordinates outside of it."""
-    if insert.block() is None:  # of another file
-        return []
-    try:
-        return list(insert.virtual_entities())
-    except Exception as error:
-        raise InputError(
-            f"its block can't be laid out: {str(error)[:100]}", field=f"INSERT {insert.dxf.name}"
-        ) from None
+def _elsewhere(insert: Any) -> bool:
+    """Whether an inserted block is of another file."""
+    block = insert.block()
+    return block is None or block.block.is_xref or block.block.is_xref_overlay
 
 
 def _is_mesh(entity: Any) -> bool:
     return entity.dxftype() == "POLYLINE" and (entity.is_polygon_mesh or entity.is_poly_face_mesh)
 
 
-def _path_of(entity: Any, label: str) -> Any:
-    """An entity as a path of lines and Bezier curves; None for one of a single point."""
-    from ezdxf import path as paths
-
-    try:
-        path = paths.make_path(entity)
-    except Exception as error:  # splines without knots, ...
-        raise InputError(
-            f"can't be read as a curve: {str(error)[:100]}", field=f"{label}{_begin(entity)}"
-        ) from None
-    points = np.array([tuple(point) for point in path.control_vertices()]).reshape(-1, 3)
-    if not (np.abs(points) <= LARGEST).all():
-        raise InputError("is no curve: expected points within 1e60", field=label)
-    return path if len(points) > 1 and np.ptp(points, axis=0).any() else None
-
-
-def _begin(entity: Any) -> str:
-    """Where an entity begins, as far as it says so: handles mean nothing to who draws."""
-    for name in ("start", "insert", "center"):
-        place = entity.dxf.get(name) if entity.dxf.is_supported(name) else None
-        if place is not None:
-            return f" at {_place(place)}"
-    return ""
-
-
-def _place(point: Iterable[float]) -> str:
-    return f"({', '.join(f'{value:.6g}' for value in point)})"
-
-
-def _flattened(paths: Sequence[tuple[Any, str]]) -> Iterator[DrawnCurve]:
-    """Points on the paths, dense enough for the size of all of them."""
-    corners = [tuple(point) for path, _ in paths for point in path.control_vertices()]
-    if not corners:
+def _flattened(outlines: Sequence[tuple[Outline, str]]) -> Iterator[DrawnCurve]:
+    """Points on the outlines, dense enough for the size of all of them."""
+    if not outlines:
         return
-    sag = _SAG * float(np.linalg.norm(np.ptp(np.array(corners), axis=0)))
-    for path, label in paths:
-        points = np.array(
-            [tuple(point) for point in path.flattening(sag)]
-            if path.has_curves
-            else [tuple(point) for point in path.control_vertices()]
-        )
-        closed = path.is_closed and len(points) > 3
+    corners = np.concatenate([outline.corners for outline, _ in outlines])
+    sag = SAG * float(np.linalg.norm(np.ptp(corners, axis=0)))
+    for outline, label in outlines:
+        points = outline.points(sag)
+        closed = outline.closed and len(points) > 3
         kind, _, within = label.partition(" ")
         block = f" {within.partition(' ')[2]}" if " " in within else ""
-        name = f"{kind}{block} from {_place(points[0])}"
+        name = f"{kind}{block} from {place_of(points[0])}"
         yield DrawnCurve(points[: len(points) - closed], closed, name)

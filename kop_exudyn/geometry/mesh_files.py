@@ -90,7 +90,7 @@ def _check_count(n_faces: int) -> None:
 
 
 def _obj(content: bytes) -> Mesh:
-    found = parse_obj(content.decode("utf-8", errors="replace"))
+    found = parse_obj(content)
     _check_count(len(found.faces))
     return found.vertices, triangles_of((face for face, _ in found.faces), found.vertices)
 

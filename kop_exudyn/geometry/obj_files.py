@@ -1,10 +1,11 @@
-"""Wavefront OBJ files: their vertices, faces and polylines. Materials, textures, normals and groups
-are passed over, and no other file is opened."""
+"""Wavefront OBJ files: their vertices, faces, polylines, and curves in free form. Materials,
+textures, normals and groups are passed over, and no other file is opened."""
 
 from __future__ import annotations
 
+import codecs
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,32 +18,70 @@ _LARGEST = 1e60  # of coordinates, whose powers stay within double precision
 class ObjContent:
     """What an OBJ file draws.
 
-    vertices (V, 3)
+    vertices (V, 3); weights (V,) : of rational curves, 1 where none is given
     faces, lines : numbers of vertices, and the line of the file that each stands in
+    curves : B-splines and Bezier curves
     left_out : elements of other kinds -> how many there are
     """
 
     vertices: np.ndarray
+    weights: np.ndarray
     faces: list[tuple[list[int], int]]
     lines: list[tuple[list[int], int]]
+    curves: list[ObjCurve]
     left_out: dict[str, int]
 
 
-# curves and surfaces in free form, and points, which nothing here uses
-_OTHER_ELEMENTS = ("p", "curv", "curv2", "surf")
+@dataclass
+class ObjCurve:
+    """A curve in free form, of pieces of polynomials.
+
+    picked : numbers of its control points; line : of the file, that it begins in
+    between : the parameters that it begins and ends at
+    kind : "bspline" or "bezier"; rational : whether weights matter
+    degree : of the polynomials
+    parameters : a B-spline's knots, or where Bezier pieces meet
+    """
+
+    picked: list[int]
+    line: int
+    between: tuple[float, float]
+    kind: str
+    rational: bool
+    degree: int
+    parameters: list[float] = field(default_factory=list)
+
+    @property
+    def knots(self) -> list[float]:
+        """Of the same curve as a B-spline (Piegl, Tiller: The NURBS Book, 1997, section 2.2)."""
+        if self.kind == "bspline":
+            return self.parameters
+        ends = self.parameters[:1] + self.parameters[-1:]
+        return sorted([*ends, *(u for u in self.parameters for _ in range(self.degree))])
 
 
-def parse_obj(text: str) -> ObjContent:
+# surfaces in free form, curves on them, and points, which nothing here uses
+_OTHER_ELEMENTS = ("p", "curv2", "surf")
+_FREE_FORMS = ("bspline", "bezier")
+
+
+def parse_obj(content: bytes) -> ObjContent:
     """The content of an OBJ file. Raises InputError naming the line that can't be read."""
     vertices: list[list[float]] = []
+    weights: list[float] = []
     faces: list[tuple[list[int], int]] = []
     lines: list[tuple[list[int], int]] = []
+    curves: list[ObjCurve] = []
     left_out: dict[str, int] = {}
-    for number, line in _lines(text):
+    form: list[str] = []
+    degree = 0
+    in_curve = False
+    for number, line in _lines(_text(content)):
         keyword, *values = line.split("#")[0].split() or [""]
         place = f"line {number}"
         if keyword == "v":
             vertices.append(_vertex(values, place))
+            weights.append(_numbers(values[3:4], place)[0] if len(values) == 4 else 1.0)
         elif keyword in ("f", "fo", "l"):
             picked = [_index(value, len(vertices), place) for value in values]
             least, what = (2, "a polyline") if keyword == "l" else (3, "a face")
@@ -53,9 +92,38 @@ def parse_obj(text: str) -> ObjContent:
                     value=line.strip(),
                 )
             (lines if keyword == "l" else faces).append((picked, number))
-        elif keyword in _OTHER_ELEMENTS:
+        elif keyword == "cstype":
+            form = values
+        elif keyword == "deg":
+            degree = _whole(values[0] if values else "", place)
+        elif keyword == "curv" and form[-1:] and form[-1] in _FREE_FORMS:
+            picked = [_index(value, len(vertices), place) for value in values[2:]]
+            begin, end = _numbers(values[:2], place, 2)
+            rational = form[0] == "rat"
+            curves.append(ObjCurve(picked, number, (begin, end), form[-1], rational, degree))
+            in_curve = True
+        elif keyword == "parm" and in_curve and values[:1] == ["u"]:
+            curves[-1].parameters += _numbers(values[1:], place)
+        elif keyword == "end":
+            in_curve = False
+        elif keyword in (*_OTHER_ELEMENTS, "curv"):
             left_out[keyword] = left_out.get(keyword, 0) + 1
-    return ObjContent(np.array(vertices, float).reshape(-1, 3), faces, lines, left_out)
+            in_curve = False
+    return ObjContent(
+        np.array(vertices, float).reshape(-1, 3),
+        np.array(weights, float),
+        faces,
+        lines,
+        curves,
+        left_out,
+    )
+
+
+def _text(content: bytes) -> str:
+    """The text, in the encoding that its first bytes tell."""
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return content.decode("utf-16", errors="replace")
+    return content.decode("utf-8-sig", errors="replace")
 
 
 def _lines(text: str) -> Iterator[tuple[int, str]]:
@@ -64,6 +132,7 @@ def _lines(text: str) -> Iterator[tuple[int, str]]:
     for number, line in enumerate(text.splitlines(), 1):
         if not begun:
             first = number
+        line = line.rstrip()  # editors leave spaces behind the backslash
         begun += line.removesuffix("\\") + " "
         if not line.endswith("\\"):
             yield first, begun
@@ -85,6 +154,27 @@ def _vertex(values: Sequence[str], place: str) -> list[float]:
             value=" ".join(values),
         )
     return point
+
+
+def _numbers(values: Sequence[str], place: str, count: int | None = None) -> list[float]:
+    """Finite numbers, so many."""
+    try:
+        found = [float(value) for value in values]
+    except ValueError:
+        found = [np.nan]
+    if not np.isfinite(found).all() or count not in (None, len(found)):
+        raise InputError(
+            "expected " + ("numbers" if count is None else f"{count} numbers"),
+            field=place,
+            value=" ".join(values),
+        )
+    return found
+
+
+def _whole(text: str, place: str) -> int:
+    if not text.isdecimal() or len(text) > 3:
+        raise InputError("expected a whole number", field=place, value=text)
+    return int(text)
 
 
 def _index(text: str, n_vertices: int, place: str) -> int:

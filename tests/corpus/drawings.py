@@ -302,8 +302,8 @@ def _half_block() -> bytes:
     return dxf(draw)
 
 
-@case("block_of_another_file.dxf", Net())
-def _xref() -> bytes:
+@case("block_that_is_missing.dxf", Net(findings={"suspicious": 1}))
+def _missing_block() -> bytes:
     def draw(document, space):
         lines(space)
         space.add_blockref("NOT_HERE", (0, 0))
@@ -808,9 +808,10 @@ def _faces() -> str:
     return "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
 
-@case("free_form_only.obj", Refused("contains no curves (1 curv elements)"))
-def _free_form() -> str:
-    return "v 0 0 0\nv 1 0 0\ncstype bezier\ndeg 1\ncurv 0 1 1 2\nparm u 0 1\nend\n"
+@case("surfaces_only.obj", Refused("contains no curves (1 surf elements)"))
+def _surface_only() -> str:
+    head = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\ncstype bezier\ndeg 1 1\n"
+    return head + "surf 0 1 0 1 1 2 3 4\nparm u 0 1\nparm v 0 1\nend\n"
 
 
 @case("bad_number.obj", Refused("expected three coordinates of a vertex"))

@@ -12,7 +12,7 @@ from pathlib import Path
 FOLDER = Path(__file__).resolve().parent
 sys.path.insert(0, str(FOLDER))
 
-import drawings  # noqa: E402
+import kinds as drawings  # noqa: E402
 import meshes  # noqa: E402
 
 

@@ -18,7 +18,7 @@ from kop_exudyn.units import Units
 FOLDER = Path(__file__).resolve().parent
 sys.path.insert(0, str(FOLDER))
 
-import drawings  # noqa: E402
+import kinds as drawings  # noqa: E402
 import meshes  # noqa: E402
 
 FILES = FOLDER / "files"

@@ -1,0 +1,148 @@
+"""What a drawing shows besides laths' axes, or as something else than what they become: bolts,
+outlines, corners that smooth curves round off, curves far away from all others or at another
+height."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+
+from ..errors import InputError
+from .drawing import DrawnCurve, Finding
+
+# A loop around a place where two curves cross is a bolt's if it is nearly centred there, and so
+# small against the way to the next crossing, or, where there is none, against the drawing.
+_CENTRED, _SMALL, _SMALL_ALONE = 0.25, 0.2, 0.05
+# Four pi area / perimeter^2 is 1 for a circle, 0.14 for a rectangle of 20 to 1.
+_NARROW = 0.15
+_FEW = 0.1  # of the curves: fewer that leave the plane of the others are at a wrong height
+_ROUNDED = 0.1  # of a straight piece: how far a smooth curve may leave it; an octagon's does so
+
+
+def without_bolts(
+    curves: Sequence[DrawnCurve], flat: Sequence[np.ndarray], size: float
+) -> tuple[list[DrawnCurve], list[np.ndarray], list[Finding]]:
+    """The curves, and their points in plan, without small loops around places where two others
+    cross, which show bolts or holes.
+
+    flat : points (n, 2) of each in plan
+    size : of the drawing
+    """
+    loops = [k for k, curve in enumerate(curves) if curve.closed]
+    rest = [k for k, curve in enumerate(curves) if not curve.closed]
+    if not loops or len(rest) < 2:
+        return list(curves), list(flat), []
+    lines = np.array([shapely.LineString(flat[k]) for k in rest])
+    i, j = shapely.STRtree(lines).query(lines, predicate="intersects")
+    met = shapely.intersection(lines[i[i < j]], lines[j[i < j]])
+    places = np.unique(shapely.get_coordinates(met), axis=0)
+    if not len(places):
+        return list(curves), list(flat), []
+    bolts, tree = [], shapely.STRtree(shapely.points(places))
+    for k in loops:
+        radius = 0.5 * float(np.ptp(flat[k], axis=0).max())
+        middle = 0.5 * (flat[k].min(axis=0) + flat[k].max(axis=0))
+        near = tree.query(shapely.Point(middle), predicate="dwithin", distance=radius / _SMALL)
+        off = np.linalg.norm(places[near] - middle, axis=1)
+        centred = (off <= _CENTRED * radius).sum()
+        alone = len(places) > 1 or radius <= _SMALL_ALONE * size
+        if centred == 1 and len(near) == 1 and alone:
+            bolts.append(k)
+    if not bolts:
+        return list(curves), list(flat), []
+    text = (
+        f"{len(bolts)} small loops around places where two curves cross, as bolts and holes are "
+        f"drawn, such as {curves[bolts[0]].label}"
+    )
+    found = Finding("skipped", text, np.array([curves[k].points.mean(axis=0) for k in bolts]))
+    kept = [k for k in range(len(curves)) if k not in set(bolts)]
+    return [curves[k] for k in kept], [flat[k] for k in kept], [found]
+
+
+def narrow_loops(curves: Sequence[DrawnCurve], flat: Sequence[np.ndarray]) -> list[Finding]:
+    """A finding where loops look like outlines of laths."""
+    found = []
+    for curve, points in zip(curves, flat):
+        if not curve.closed:
+            continue
+        polygon = shapely.Polygon(points)
+        if 4 * np.pi * polygon.area <= _NARROW * polygon.length**2:
+            found.append(curve)
+    if not found:
+        return []
+    text = (
+        f"{len(found)} closed curves are long and narrow, such as {found[0].label}: if they are "
+        "outlines of laths, draw the laths' axes instead"
+    )
+    return [Finding("suspicious", text, np.array([c.points.mean(axis=0) for c in found]))]
+
+
+def rounded_corners(curves: Sequence[DrawnCurve]) -> list[Finding]:
+    """A finding where smooth curves through the points of polylines are far from what was drawn."""
+    largest, places, worst = 0.0, [], None
+    for curve in curves:
+        away, share, place = _departure(curve)
+        if share > _ROUNDED:
+            places.append(place)
+            if away > largest:
+                largest, worst = away, curve
+    if worst is None:
+        return []
+    text = (
+        f"{len(places)} curves have corners that smooth curves through their points round off, "
+        f"{worst.label} by up to {largest:.3g} (--curves polyline keeps corners)"
+    )
+    return [Finding("suspicious", text, np.array(places))]
+
+
+def refuse_strays(curves: Sequence[DrawnCurve], tolerance: float, size: float) -> None:
+    """Raise InputError where most curves are shorter than the tolerance, a share of a size that
+    something far away from them makes."""
+    lengths = [float(np.linalg.norm(np.ptp(curve.points, axis=0))) for curve in curves]
+    short = sum(length <= tolerance for length in lengths)
+    if 2 * short <= len(curves):
+        return
+    middles = np.array([curve.points.mean(axis=0) for curve in curves])
+    off = np.linalg.norm(middles - np.median(middles, axis=0), axis=1) + lengths
+    far = curves[int(off.argmax())]
+    raise InputError(
+        f"{short} of {len(curves)} curves are shorter than the tolerance of {tolerance:.3g}, a "
+        f"share of the drawing's size of {size:.3g}. Leave out what is far away or far larger, as "
+        f"{far.label}, or give a smaller --tolerance"
+    )
+
+
+def refuse_stray_heights(curves: Sequence[DrawnCurve], tolerance: float) -> None:
+    """Raise InputError where nearly all curves lie in one of the planes across an axis, and a few
+    leave it, as a point at a wrong height does."""
+    most = max(1, int(_FEW * len(curves)))
+    for axis, name in enumerate("xyz"):
+        level = float(np.median(np.concatenate([curve.points[:, axis] for curve in curves])))
+        off = [float(np.abs(curve.points[:, axis] - level).max()) for curve in curves]
+        stray = [k for k, height in enumerate(off) if height > tolerance]
+        if 0 < len(stray) <= most < len(curves) // 2:
+            worst = max(stray, key=off.__getitem__)
+            raise InputError(
+                f"leaves the plane {name} = {level:.6g}, which {len(curves) - len(stray)} of "
+                f"{len(curves)} curves lie in, by {off[worst]:.3g}",
+                field=curves[worst].label,
+            )
+
+
+def _departure(curve: DrawnCurve) -> tuple[float, float, np.ndarray]:
+    """How far the smooth curve leaves the straight pieces' middles: as a length, as a share of the
+    piece (the largest of each), and where that is."""
+    from scipy.interpolate import CubicSpline
+
+    points = np.concatenate([curve.points, curve.points[:1]]) if curve.closed else curve.points
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    if len(points) < 3 or not steps.all():
+        return 0.0, 0.0, points[0]
+    t = np.concatenate([[0.0], np.cumsum(steps)])
+    spline = CubicSpline(t, points, bc_type="periodic" if curve.closed else "natural")
+    middles = 0.5 * (points[:-1] + points[1:])
+    away = np.linalg.norm(spline(0.5 * (t[:-1] + t[1:])) - middles, axis=1)
+    shares = away / steps
+    return float(away.max()), float(shares.max()), middles[int(shares.argmax())]

@@ -1,0 +1,9 @@
+"""All drawings of the corpus: importing this module fills `drawings.CASES`."""
+
+import insertions  # noqa: F401
+import misdrawn  # noqa: F401
+import obj_styles  # noqa: F401
+import splines  # noqa: F401
+from drawings import CASES, Net, Refused
+
+__all__ = ["CASES", "Net", "Refused"]
