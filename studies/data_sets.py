@@ -4,12 +4,12 @@
 
 Ten C-shells share 8 linear and 5 angular parts, as the ten of Becker et al. (2024) do: five
 conformal images of a square, and a fan, a hexagon, a ring, a skew net and a triangle. Five umbrella
-meshes of 84 to 150 cells, one of them on supports, share 8 cells. Seven grids, one of strongly
-varying curvature, share 8 + 5 parts. Four released umbrella meshes share 8 cells (read from beside
-the repository, left out where they aren't). The search is asked for its quick effort: one start a
-set. Every table has the inputs and the baselines beside the
-kit: see the study `direct_vs_relaxed`. Deviations are distances of the joints from the target
-surface, in % of its size.
+meshes of 84 to 150 cells, one of them on supports, share 8 cells. Nine grids, among them one of
+strongly varying curvature, one of asymptotic lines held at its boundary and one of geodesics, share
+8 + 5 parts. Four released umbrella meshes share 8 cells (read from beside the repository, left out
+where they aren't). The search is asked for its quick effort: one start a set. Every table has the
+inputs and the baselines beside the kit: see the study `direct_vs_relaxed`. Deviations are distances
+of the joints from the target surface, in % of its size.
 """
 
 from __future__ import annotations

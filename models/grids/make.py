@@ -4,10 +4,11 @@
 
 Grids keep to their surface without supports when their lamellas' normal curvature varies or changes
 sign. Straight lamellas (asymptotic lines) and equally curved ones (on a sphere) would let the
-hinges turn freely. And lamellas that the surface twists (geodesic torsion) untwist, which drew
-grids up to 1.3 % off their surfaces. So all networks run along curvature lines or near them: lines
-of u and v are such on the minimal surfaces and on the dome; on the vault, the sum of a wave in x
-and one in y, nearly so; on the saddle the lines are traced.
+hinges turn freely: the asymptotic net in models/grids_hard is held at its boundary. And lamellas
+that the surface twists (geodesic torsion) untwist, which drew grids up to 1.3 % off their surfaces.
+So all networks in models/grids run along curvature lines or near them: lines of u and v are such on
+the minimal surfaces and on the dome; on the vault, the sum of a wave in x and one in y, nearly so;
+on the saddle the lines are traced.
 
 What is left of their deviation (up to 0.4 % of the size) goes when the lamellas are fitted to their
 surfaces, one design alone, before the files are written.
@@ -17,6 +18,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -48,6 +50,20 @@ def curvature_lines(half: float, reach: float) -> dict:
     }
 
 
+def asymptotic_lines(half: float, count: int, domain: list[list[float]]) -> dict:
+    """Both lines through each of some points of the first axis, traced as far as the domain."""
+    points = [[u, 0.0] for u in lines(half, count)]
+    return {"type": "asymptotic", "domain": domain, "points": points, "second_points": points}
+
+
+def geodesics(half: float, reach: float) -> dict:
+    """Lines that leave both axes at right angles, up to `half` from the middle."""
+    of_u = [[u, 0.0, 0.5 * np.pi] for u in lines(half)]
+    of_v = [[0.0, v, 0.0] for v in lines(half)]
+    domain = [[-reach, -reach], [reach, reach]]
+    return {"type": "geodesics", "domain": domain, "through": of_u + of_v}
+
+
 def analytic(name: str, **coefficients) -> dict:
     return {"type": "analytic", "name": name, **coefficients}
 
@@ -70,11 +86,20 @@ GRIDS = {
 }
 
 PEAKS = [[0.7, -0.35, 0.1, 0.45], [-0.45, 0.5, -0.2, 0.4], [0.25, 0.2, 0.6, 0.35]]
-# in models/grids_hard: curvature that varies strongly
-HARD = {"peaks": (analytic("gaussians", bumps=PEAKS), isolines(lines(0.9, 10), lines(0.9, 10)))}
+# in models/grids_hard: curvature that varies strongly; straight upright strips, which only supports
+# keep from turning; lamellas that bend upright only
+HARD = {
+    "peaks": (analytic("gaussians", bumps=PEAKS), isolines(lines(0.9, 10), lines(0.9, 10))),
+    "asymptotic": (
+        analytic("catenoid", scale=1.0),
+        asymptotic_lines(1.2, 9, [[-1.25, -0.8], [1.25, 0.8]]),
+        "boundary",
+    ),
+    "geodesic": (analytic("gaussians", bumps=WAVES), geodesics(0.7, 0.95)),
+}
 
 
-def design(name: str, surface: dict, network: dict) -> dict:
+def design(name: str, surface: dict, network: dict, held: str | None = None) -> dict:
     return {
         "format": "kop_exudyn/design",
         "version": 1,
@@ -85,6 +110,7 @@ def design(name: str, surface: dict, network: dict) -> dict:
         "section": {"type": "rectangle", "width": 0.004, "height": 0.03},
         "surface": surface,
         "network": network,
+        **({"held": held} if held else {}),
         "elements_per_piece": 2,
     }
 
@@ -130,8 +156,9 @@ def vault(path: Path, rings: int = 20) -> None:
     path.write_text("\n".join(rows) + "\n")
 
 
-def write(path: Path, name: str, surface: dict, network: dict) -> None:
-    content = fitted(design(name, surface, network))
+def write(path: Path, *described: Any) -> None:
+    """described : as for `design`."""
+    content = fitted(design(*described))
     values = json.dumps(content.pop("straightened"))
     head = json.dumps(content, indent=1)
     path.parent.mkdir(exist_ok=True)

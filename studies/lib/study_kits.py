@@ -87,7 +87,7 @@ def data_sets(models: Path, released: Path, quick: bool = False) -> list[KitCase
     cases = [
         KitCase("ten C-shells", shells, {"linear": 8, "angular": 5}, stages),
         KitCase("large umbrella meshes", large, {"cell": 8}, stages),
-        KitCase("seven grids", grids, {"linear": 8, "angular": 5}, stages),
+        KitCase("nine grids", grids, {"linear": 8, "angular": 5}, stages),
     ]
     published = [released / f"{name}.json.gz" for name in RELEASED]
     if not quick and all(file.is_file() for file in published):
