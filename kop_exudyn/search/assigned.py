@@ -15,7 +15,7 @@ from .events import ASSIGNED, SQPLabel
 from .objective import DesignDerivatives, Evaluation
 from .reassign import LocalModel, MoveParts, Reassignment, best_parts, keep_parts, reassign
 from .settings import StageSettings
-from .stage_results import SAME_STATE, StageResult, combined, distance
+from .stage_results import StageResult, all_same, combined
 from .stages import Stages
 
 log = logging.getLogger(__name__)
@@ -110,7 +110,7 @@ def opened_stage(
     for number in range(settings.redeployments + 1):
         opened = stages.judged(replace(result, designs=stages.redeployed(result)))
         log.info("opened from the assembly: J = %.5g, from %.5g", _value(opened), _value(result))
-        same = opened.value is not None and _all_same(stages, result, opened)
+        same = opened.value is not None and all_same(stages.dataset.designs, result, opened)
         if opened.value is not None:
             found.append(result if same else opened)
         if number == settings.redeployments or opened.value is None or same:
@@ -188,7 +188,7 @@ def _secured(
         return best
     found = secured.assigned(best, SQPLabel.of_round(next(numbers)))
     opened = replace(found, designs=secured.redeployed(found))
-    same = found.value is not None and _all_same(secured, found, opened)
+    same = found.value is not None and all_same(secured.dataset.designs, found, opened)
     return replace(found, steps=best.steps + found.steps) if same else best
 
 
@@ -249,14 +249,6 @@ class _Rounds:
         )
         self.steps += result.steps
         return result
-
-
-def _all_same(stages: Stages, led: StageResult, opened: StageResult) -> bool:
-    return all(
-        distance(design, a, b) <= SAME_STATE
-        for design, a, b in zip(stages.dataset.designs, led.designs, opened.designs)
-        if isinstance(a, Evaluation) and isinstance(b, Evaluation)
-    )
 
 
 def _many_reassigned(stages: Stages, best: StageResult) -> StageResult:

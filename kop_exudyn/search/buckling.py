@@ -20,7 +20,7 @@ def missed_on_return(
     Returns the largest distance of a joint, as a share of the target's size. Raises
     SimulationFailure when no equilibrium is found on the way.
     """
-    end = objective.follow(origin.q, state, steps)[-1]
+    end = objective.follow(origin.q, state, steps, fitted_only=True)[-1]
     return objective.apart(origin, end)
 
 

@@ -51,6 +51,7 @@ class SQPLabel:
 
 
 ASSIGNED = SQPLabel(Stage.ASSIGNED, Stage.ASSIGNED)  # the assigned stage without rounds
+LEVELLED = SQPLabel(f"{Stage.ASSIGNED}-levelled", Stage.ASSIGNED)  # see levelling.py
 UNRELAXED = SQPLabel(Stage.UNRELAXED, Stage.UNRELAXED)
 
 

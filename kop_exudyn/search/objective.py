@@ -16,6 +16,7 @@ from time import perf_counter
 
 import numpy as np
 
+from ..checks import check_positive
 from ..equilibrium.equilibria import Equilibrium, Start
 from ..equilibrium.exudyn_confirm import Confirmation, confirm
 from ..equilibrium.newton import NewtonOptions, refine, solve
@@ -42,6 +43,8 @@ class Weights:
     fit : beta, on T / l0^2
     energy : gamma, on E / E0
     share : of the target positions in T; the rest is closest points
+    level : share of the size beyond which distances from the target count with their fourth power,
+        see `TargetFitting`; None: never
     others : (name, weight) of other terms, see the modules of `terms/`; `Weights.of` takes all by
         name
 
@@ -51,9 +54,12 @@ class Weights:
     fit: float = 1e4
     energy: float = 0.02
     share: float = 0.1
+    level: float | None = None
     others: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
+        if self.level is not None:
+            check_positive("weights.level", self.level)
         for name, weight in self.of_terms().items():
             term_class(name)
             if not (isinstance(weight, (int, float)) and 0 <= weight < float("inf")):
@@ -66,7 +72,7 @@ class Weights:
     @classmethod
     def of(cls, values: Mapping[str, float]) -> Weights:
         """Weights by the names of the terms (and "share"); those not given have their defaults."""
-        own = {name: values[name] for name in ("fit", "energy", "share") if name in values}
+        own = {name: values[name] for name in ("fit", "energy", "share", "level") if name in values}
         return cls(
             **own,
             others=tuple(
@@ -91,7 +97,9 @@ class Weights:
 
     def to_dict(self) -> dict[str, float]:
         """What `of` takes."""
-        return {"fit": self.fit, "energy": self.energy, "share": self.share, **dict(self.others)}
+        felt = {} if self.level is None else {"level": self.level}
+        own = {"fit": self.fit, "energy": self.energy, "share": self.share}
+        return {**own, **felt, **dict(self.others)}
 
 
 @dataclass(frozen=True)
@@ -167,7 +175,7 @@ class DesignObjective:
     ):
         self.design, self.weights, self.requirements = design, weights, requirements
         self.reference = reference if reference is not None else reference_of(design)
-        self._fitting = TargetFitting(self.reference.target, weights.share)
+        self._fitting = TargetFitting(self.reference.target, weights.share, level=weights.level)
         self._terms = [
             (term_class(name)(design, self.reference), weight)
             for name, weight in weights.of_terms().items()
@@ -197,15 +205,24 @@ class DesignObjective:
         return found
 
     def evaluate(
-        self, q: np.ndarray, previous: Evaluation | None = None, options: NewtonOptions = _TRIAL
+        self,
+        q: np.ndarray,
+        previous: Evaluation | None = None,
+        options: NewtonOptions = _TRIAL,
+        fitted_only: bool = False,
     ) -> Evaluation:
         """F at q, warm-started from a previous evaluation (default: the input design's equilibria).
+
+        fitted_only : the other roles' states stay as they were, for those who look at the fitted
+            one alone
 
         Raises SimulationFailure, naming design and role, when an equilibrium isn't found.
         """
         starts = previous.equilibria if previous is not None else self.reference.equilibria
-        equilibria = {}
+        equilibria = dict(starts) if fitted_only else {}
         for role in self.design.roles:
+            if fitted_only and not role.fitted:
+                continue
             try:
                 found = self._solve(role.name, q, starts[role.name], role.opening, options)
                 self.design.check_state(role.name, found.state)
@@ -381,14 +398,17 @@ class DesignObjective:
         }
         return replace(evaluation, equilibria=equilibria)
 
-    def follow(self, q: np.ndarray, previous: Evaluation, steps: int) -> list[Evaluation]:
+    def follow(
+        self, q: np.ndarray, previous: Evaluation, steps: int, fitted_only: bool = False
+    ) -> list[Evaluation]:
         """Evaluations along the straight path from a previous one to q, in equal steps, each
-        started from the last."""
+        started from the last; see `evaluate`."""
         path: list[Evaluation] = []
         for t in np.linspace(0, 1, steps + 1)[1:]:
             at = q if t == 1 else previous.q + t * (q - previous.q)
             try:
-                path.append(self.evaluate(at, path[-1] if path else previous, NewtonOptions()))
+                last = path[-1] if path else previous
+                path.append(self.evaluate(at, last, NewtonOptions(), fitted_only))
             except SimulationFailure as failure:
                 raise failure.within(f"at {t:.0%} of the way to the parts") from None
         return path

@@ -25,6 +25,7 @@ from .assigned import opened_stage
 from .checkpoints import NoStore, Store
 from .dataset import Dataset
 from .events import UNRELAXED, Observer, StageEvent
+from .levelling import level
 from .neighbours import resized
 from .objective import Evaluation, Weights
 from .pool import DesignPool
@@ -139,7 +140,8 @@ def optimize_kit(
         starts = assigned_from_starts(stages, result.at_parts, bases)
         announce("deployment of the assigned designs")
         opened = opened_stage(stages, starts.best, result.at_parts)
-        found["assigned"] = forgiving_from_starts(stages, starts, opened, result.at_parts)
+        forgiving = forgiving_from_starts(stages, starts, opened, result.at_parts)
+        found["assigned"] = level(stages, forgiving)
         result.tried = starts.tried
         result.seconds["search"] = perf_counter() - begin_search
         found.update({stage: _confirmed(stages, outcome) for stage, outcome in found.items()})

@@ -85,6 +85,9 @@ class StageSettings:
     reuse : what fewer pieces are worth that have to be made so that the designs can be built one
         after the other: for 1 % less of them the objective may rise by this many %. Results are
         compared by J times the share of fabricated pieces to this power
+    levelling : share of a design's size. In the end the parts are tuned once more with deviations
+        beyond it counting with their fourth power, and the result kept where the largest deviation
+        of all designs falls by it, see levelling.py; 0: not
     slit_cost : of slit parts, over the weight of the fit: where the slits of a kit are as long as
         the median element, J is larger by half of this times that weight, and with the slits'
         mean square. 1e-3: slits of a tenth of that length count like joints 0.2 % of a design's
@@ -118,6 +121,7 @@ class StageSettings:
     constraints: LinearConstraints | None = None
     hessian: str = "exact"
     reuse: float = 0.0
+    levelling: float = 1e-3
     slit_cost: float = 1e-3
     effort: str = "normal"
     requirements: Requirements = Requirements()
@@ -139,6 +143,7 @@ class StageSettings:
         check_choice("hessian", self.hessian, ("exact", "bfgs"))
         check_choice("effort", self.effort, tuple(EFFORTS))
         check_not_negative("reuse", self.reuse)
+        check_not_negative("levelling", self.levelling)
         for kind in self.bounds or {}:
             check_choice("bounds", kind, kind_names())
             part_kind(kind).bounds(self.bounds)

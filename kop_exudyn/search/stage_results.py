@@ -106,6 +106,15 @@ def distance(design: Design, a: Evaluation, b: Evaluation) -> float:
     return float(np.linalg.norm(joints[0] - joints[1], axis=1).max()) / a.fit.size
 
 
+def all_same(designs: Sequence[Design], led: StageResult, opened: StageResult) -> bool:
+    """Whether all designs that were led to a state and opened by themselves are in the same one."""
+    return all(
+        distance(design, a, b) <= SAME_STATE
+        for design, a, b in zip(designs, led.designs, opened.designs)
+        if isinstance(a, Evaluation) and isinstance(b, Evaluation)
+    )
+
+
 def combined(results: Sequence[StageResult], dataset: Dataset) -> StageResult:
     """Each design from its own result, all of the same kit; its objective is to be judged anew."""
     first = np.cumsum([0, *(len(design.groups) for design in dataset.designs)])

@@ -253,10 +253,20 @@ class Stages:
         other.dataset = replace(self.dataset, weights=Weights.of({**weights.to_dict(), **more}))
         return other
 
+    def levelled(self, level: float) -> Stages:
+        """The same stages with deviations beyond a share of a design's size counting with their
+        fourth power."""
+        other = copy(self)
+        weights = replace(self.dataset.weights, level=level)
+        other.dataset = replace(self.dataset, weights=weights)
+        return other
+
     def weighed(self, result: StageResult) -> StageResult:
-        """The same result judged by the weights of these stages, without the states on the way."""
+        """The same result judged by the weights of these stages; with the states on the way where
+        designs have to open by themselves."""
+        opening = self.dataset.requirements.opening
         found = {
-            n: (d.q, dict(d.equilibria))
+            n: (d.q, dict(d.equilibria), d.way if opening else ())
             for n, d in enumerate(result.designs)
             if isinstance(d, Evaluation)
         }

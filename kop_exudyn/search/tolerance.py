@@ -25,7 +25,8 @@ from .objective import DesignObjective, Evaluation
 
 _USUAL_SHARE, _LEAST_LENGTH = 1e-3, 2e-4  # of the median length; m
 _USUAL_ANGLE = np.radians(0.1)
-_STEPS_BACK = 3  # to the planned elements, which are near
+# to the planned elements, which are near: more only where one doesn't end at the origin
+_STEPS_BACK = (1, 3)
 CONFIRMED = 0.1  # share of the samples that Exudyn confirms
 _SEARCH = (0, 1)  # seed of the errors that a search tries
 
@@ -141,7 +142,7 @@ def _samples(
         errors = deviations * generator.standard_normal(len(deviations))
         asked = int(np.ceil((k + 1) * confirmed)) > int(np.ceil(k * confirmed))
         try:
-            found = objective.evaluate(evaluation.q + errors, evaluation)
+            found = objective.evaluate(evaluation.q + errors, evaluation, fitted_only=not asked)
             if asked:
                 found = objective.confirm(found)
         except SimulationFailure as failure:
@@ -158,9 +159,14 @@ def _samples(
             errors,
             moved,
             found.fit.max_percent,
-            snapped=bool(away and snapped(objective, found, evaluation, _STEPS_BACK)),
+            snapped=bool(away and _stays_away(objective, found, evaluation)),
             confirmed=asked,
         )
+
+
+def _stays_away(objective: DesignObjective, state: Evaluation, origin: Evaluation) -> bool:
+    """Whether a state doesn't come back to its origin when the errors are undone."""
+    return all(snapped(objective, state, origin, steps) for steps in _STEPS_BACK)
 
 
 def relative_tolerance(design: Design, share: float, angle: float) -> Tolerance:

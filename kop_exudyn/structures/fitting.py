@@ -4,7 +4,7 @@ placement.
 T(x) = share sum_i w_i |y_i - x*_i|^2 + (1 - share) sum_i w_i |y_i - P(y_i)|^2, minimised over rigid
 placements y = R x + t, with P the closest point on the surface and weights w that sum to one. As
 the placement is a minimiser, the gradient in x needs no derivative of it; the Hessian does, by
-Schur complement.
+Schur complement. Large distances can be given more weight by a fourth power.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..checks import check_positive
 from ..errors import InputError
 from ..geometry.triangles import Closest, TriangleSurface
 from ..rods.rotations import exp_so3
@@ -113,12 +114,22 @@ class TargetFitting:
 
     share : weight of the target positions, in [0, 1]; the surface has the rest
     weights : (n,) positive weights of the joints, all equal by default
+    level : share of the size; squared distances d^2 from the surface count as
+        d^2 (1 + d^2 / (2 (level size)^2)), so that large ones are felt more. Default: as squares
     Raises InputError for a share or weights that make no sense, and for unusable targets.
     """
 
-    def __init__(self, target: Target, share: float = 0.1, weights: np.ndarray | None = None):
+    def __init__(
+        self,
+        target: Target,
+        share: float = 0.1,
+        weights: np.ndarray | None = None,
+        level: float | None = None,
+    ):
         if not 0 <= share <= 1:
             raise InputError("must lie in [0, 1]", field="share", value=share)
+        if level is not None:
+            check_positive("level", level)
         self.surface = TriangleSurface(target.vertices, target.faces)
         self.positions = np.asarray(target.positions, dtype=float)
         if (
@@ -132,6 +143,7 @@ class TargetFitting:
                 value=self.positions.shape,
             )
         self.size, self.share = float(target.size), float(share)
+        self._steepness = 0.0 if level is None else (level * self.size) ** -2
         self.weights = _normalised(weights, len(self.positions))
 
     def __call__(self, x: np.ndarray, placement: Placement | None = None) -> FitResult:
@@ -158,7 +170,7 @@ class TargetFitting:
         y, closest, value, gradient = found
         centre, size, motions = self._motions(y)
         slope = motions.T @ gradient.ravel()
-        hessian = self._placement_hessian(y - centre, closest, gradient, size, motions)
+        hessian = self._placement_hessian(y, centre, closest, gradient, size, motions)
         step = _descent(hessian, slope)
         fraction = 1.0
         while fraction > 1e-8:
@@ -176,13 +188,12 @@ class TargetFitting:
         y = placement.apply(x)
         closest = self.surface.closest(y)
         to_position, to_surface = y - self.positions, y - closest.points
-        squares = self.share * np.sum(to_position**2, axis=1) + (1 - self.share) * np.sum(
-            to_surface**2, axis=1
-        )
-        gradient = (
-            2 * self.weights[:, None] * (self.share * to_position + (1 - self.share) * to_surface)
-        )
-        return y, closest, float(self.weights @ squares), gradient
+        distances = np.sum(to_surface**2, axis=1)
+        steep = self._steepness * distances
+        felt = (1 - self.share) * distances * (1 + 0.5 * steep)
+        values = self.share * np.sum(to_position**2, axis=1) + felt
+        gradient = self.share * to_position + ((1 - self.share) * (1 + steep))[:, None] * to_surface
+        return y, closest, float(self.weights @ values), 2 * self.weights[:, None] * gradient
 
     def _motions(self, y: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
         """Centre, size, and dy (3n, 6) of turns about the centre (times the size: all in lengths)
@@ -200,7 +211,8 @@ class TargetFitting:
 
     def _placement_hessian(
         self,
-        arms: np.ndarray,
+        y: np.ndarray,
+        centre: np.ndarray,
         closest: Closest,
         gradient: np.ndarray,
         size: float,
@@ -208,24 +220,32 @@ class TargetFitting:
     ) -> np.ndarray:
         """(6, 6) second derivatives of T in the motion: Gauss-Newton, plus the curvature of
         rotations."""
-        rows = np.einsum("nij,njk->nik", self._blocks(closest), motions.reshape(-1, 3, 6)).reshape(
-            -1, 6
-        )
+        blocks = self._blocks(y, closest)
+        rows = np.einsum("nij,njk->nik", blocks, motions.reshape(-1, 3, 6)).reshape(-1, 6)
         hessian = rows.T @ rows
-        moment = gradient.T @ arms
+        moment = gradient.T @ (y - centre)
         hessian[:3, :3] += (0.5 * (moment + moment.T) - np.trace(moment) * np.eye(3)) / size**2
         return hessian
 
-    def _blocks(self, closest: Closest) -> np.ndarray:
-        """(n, 3, 3) square roots of d2T/dy_i2 = 2 w_i (share I + (1 - share) N), with the projector
-        N = I - dP/dx."""
+    def _blocks(self, y: np.ndarray, closest: Closest) -> np.ndarray:
+        """(n, 3, 3) square roots of the Hessian of T in each placed joint, with the projector
+        N = I - dP/dx and the direction d to the surface:
+        2 w_i (share I + (1 - share) ((1 + r) N + 2 r d d^T)), r = (distance / (level size))^2."""
         normal = np.eye(3) - closest.derivative
-        root = np.sqrt(self.share) * closest.derivative + normal
+        steep = (self._steepness * closest.squared_distances)[:, None, None]
+        across = np.sqrt(self.share + (1 - self.share) * (1 + steep))
+        root = np.sqrt(self.share) * closest.derivative + across * normal
+        if self._steepness:
+            offset = y - closest.points
+            lengths = np.linalg.norm(offset, axis=1, keepdims=True)
+            along = np.divide(offset, lengths, out=np.zeros_like(offset), where=lengths > 0)
+            more = np.sqrt(self.share + (1 - self.share) * (1 + 3 * steep)) - across
+            root = root + more * along[:, :, None] * along[:, None, :]
         return np.sqrt(2 * self.weights)[:, None, None] * root
 
     def _result(self, placement: Placement, found: _Placed) -> FitResult:
         y, closest, value, gradient = found
-        blocks = self._blocks(closest)
+        blocks = self._blocks(y, closest)
         motions = self._motions(y)[2].reshape(-1, 3, 6)
         rows = np.einsum("nij,njk->nik", blocks, motions).reshape(-1, 6)
         basis, sizes, _ = np.linalg.svd(rows, full_matrices=False)

@@ -62,7 +62,7 @@ def compared(seed: int, efforts: Sequence[str] = ("normal",)) -> dict[str, Any]:
     strip = strip_of(seed)
     results = {}
     for effort in efforts:
-        settings = StageSettings(requirements=Requirements.none(), effort=effort)
+        settings = StageSettings(requirements=Requirements.none(), effort=effort, levelling=0)
         results[effort] = optimize_kit(
             [strip], {"linear": 2}, settings=JobSettings(jobs=1, stages=settings, baselines=False)
         )

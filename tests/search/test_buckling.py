@@ -53,7 +53,7 @@ def test_no_way_back_counts_as_a_snap():
     class Stuck:
         design = None
 
-        def follow(self, q, previous, steps):
+        def follow(self, q, previous, steps, fitted_only):
             raise SimulationFailure("stuck")
 
     design, built, _ = directly_built("small/03_exp.json")

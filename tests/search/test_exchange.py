@@ -21,7 +21,7 @@ SEED = 5  # of a strip whose other starts all end in one local minimum
 def found(monkeypatch, exchanges):
     effort = Effort(0, 0, 0, 1, exchanges)
     monkeypatch.setitem(search_settings.EFFORTS, "thorough", effort)
-    stages = StageSettings(requirements=Requirements.none(), effort="thorough")
+    stages = StageSettings(requirements=Requirements.none(), effort="thorough", levelling=0)
     job = JobSettings(jobs=1, stages=stages, baselines=False)
     return optimize_kit([strip_of(SEED)], {"linear": 2}, settings=job)
 

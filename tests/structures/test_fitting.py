@@ -53,9 +53,10 @@ def motion(seed=1):
     return Placement(Rotation.random(random_state=rng).as_matrix(), rng.normal(size=3))
 
 
+@pytest.mark.parametrize("level", [None, 0.01])
 @pytest.mark.parametrize("share", [0.1, 0.7, 1.0])
-def test_gradient_by_taylor(share):
-    fitting, x = TargetFitting(TARGET, share), motion().apply(joints())
+def test_gradient_by_taylor(share, level):
+    fitting, x = TargetFitting(TARGET, share, level=level), motion().apply(joints())
     fit = fitting(x)
     direction = np.random.default_rng(2).normal(size=x.shape)
     steps = 1e-4 * 0.5 ** np.arange(4)
@@ -89,9 +90,10 @@ def test_warm_start_ends_at_the_same_placement():
     assert warm.value == pytest.approx(cold.value, rel=1e-14)
 
 
+@pytest.mark.parametrize("level", [None, 1e-4])
 @pytest.mark.parametrize("noise, tolerance", [(0.05, 0.1), (0.0005, 1e-3)])
-def test_gauss_newton_is_exact_for_small_residuals(noise, tolerance):
-    fitting, x = TargetFitting(TARGET), motion().apply(joints(noise))
+def test_gauss_newton_is_exact_for_small_residuals(noise, tolerance, level):
+    fitting, x = TargetFitting(TARGET, level=level), motion().apply(joints(noise))
     fit = fitting(x)
     direction = np.random.default_rng(5).normal(size=x.shape)
     h = 1e-7
@@ -154,6 +156,18 @@ def test_percentages_by_hand():
     assert fit.value == pytest.approx(0.09)
 
 
+def test_large_distances_count_with_their_fourth_power():
+    """By the formula, and so that the largest one is smaller at the best placement."""
+    x = motion().apply(joints())
+    plain, levelled = TargetFitting(TARGET)(x), TargetFitting(TARGET, level=0.005)(x)
+    squares, s = levelled.distances**2, 0.005 * TARGET.size
+    felt = 0.1 * levelled.displacements**2 + 0.9 * squares * (1 + squares / (2 * s**2))
+    assert levelled.value == pytest.approx(felt.mean(), rel=1e-12)
+    assert levelled.max_percent < 0.99 * plain.max_percent
+    small = TargetFitting(TARGET, level=1e6)(x)
+    assert small.value == pytest.approx(plain.value, rel=1e-9)
+
+
 def test_weights_move_the_placement():
     x = joints(0.2)
     weights = np.ones(len(x))
@@ -197,6 +211,8 @@ def test_results_and_fitting_travel_between_processes():
 def test_bad_input():
     with pytest.raises(InputError, match="share"):
         TargetFitting(TARGET, share=1.5)
+    with pytest.raises(InputError, match="level = 0.0"):
+        TargetFitting(TARGET, level=0.0)
     with pytest.raises(InputError, match="weights"):
         TargetFitting(TARGET, weights=np.zeros(25))
     with pytest.raises(InputError, match="25 finite joints"):

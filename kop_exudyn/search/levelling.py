@@ -1,0 +1,70 @@
+"""The last tuning of the parts: the largest deviation brought down.
+
+J has the mean square of the joints' distances from the target, summed over the designs. A single
+joint that is far off hardly counts there, and yet it is what is seen. Here distances d beyond a
+level s count with their fourth power, d^2 (1 + d^2 / (2 s^2)): as in a p-norm the largest tell,
+and it is smooth, with exact gradients. The assignment stays, and steps keep every design on the
+branch along which it opens, and forgiving.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import replace
+
+from .events import LEVELLED
+from .objective import Evaluation
+from .stage_results import StageResult, all_same
+from .stages import Stages
+
+log = logging.getLogger(__name__)
+
+
+def level(stages: Stages, result: StageResult) -> StageResult:
+    """The result with parts whose largest deviation is smaller, at some cost in J; the same one
+    where none are found.
+
+    What is gained is not paid for by what is required: bounds are exceeded by no more than before,
+    every design opens into the state that is reported, and no other designs snap.
+    """
+    share = stages.settings.levelling
+    if not share or not stages.optimises or result.value is None:
+        return result
+    settings, secured = stages.settings, stages.secured(forgiving=not result.snapping)
+    levelled = secured.levelled(share)
+    start = levelled.kept(levelled.weighed(result))
+    if start.value is None:
+        return result
+    end = levelled.assigned(start, LEVELLED, settings.round_steps, settings.round_tolerance)
+    found = secured.weighed(end)
+    if found.value is None or not _better(stages, found, result):
+        return result
+    snapping = stages.snapping(found)
+    if not set(snapping) <= set(result.snapping):
+        return result
+    log.info(
+        "largest deviation %.3g %%, from %.3g %%, at J = %.5g, from %.5g",
+        worst(found.designs),
+        worst(result.designs),
+        found.value,
+        result.value,
+    )
+    steps = result.steps + end.steps
+    return replace(found, steps=steps, jumps=result.jumps, snapping=snapping)
+
+
+def worst(designs: Sequence[object]) -> float:
+    """The largest deviation of designs, % of their sizes; those that failed left out."""
+    return max((d.fit.max_percent for d in designs if isinstance(d, Evaluation)), default=0.0)
+
+
+def _better(stages: Stages, found: StageResult, before: StageResult) -> bool:
+    """Whether the largest deviation fell, bounds are exceeded by no more, and the designs open into
+    where they are."""
+    if worst(found.designs) >= worst(before.designs) or found.penalty > before.penalty:
+        return False
+    if not stages.required.opening:
+        return True
+    opened = replace(found, designs=stages.redeployed(found))
+    return all_same(stages.dataset.designs, found, opened)
