@@ -9,7 +9,9 @@ from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.report.kit_run import optimize_and_report
 from kop_exudyn.search.settings import JobSettings, StageSettings
 
-STAGES = StageSettings(schedule=(1e3, 1e5), path_steps=4, leaps=0, redeployments=0, effort="quick")
+STAGES = StageSettings(
+    schedule=(1e3, 1e5), path_steps=4, leaps=0, redeployments=0, levelling=0, effort="quick"
+)
 SETTINGS = JobSettings(jobs=1, stages=STAGES, baselines=False, published=True)
 
 

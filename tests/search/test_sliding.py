@@ -33,6 +33,7 @@ STAGES = StageSettings(
     reassignments=1,
     leaps=0,
     path_steps=2,
+    levelling=0,
     effort="quick",
     requirements=Requirements.none(),
 )
