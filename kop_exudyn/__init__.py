@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:  # the same names, for type checkers and editors
+    from .analysis.model_sensitivities import ModelSensitivities as ModelSensitivities
     from .analysis.simulation import SimulationResult as SimulationResult
     from .analysis.simulation import simulate as simulate
     from .equilibrium.path import PathOptions as PathOptions
@@ -71,6 +72,7 @@ _PUBLIC = {
     "equilibrium.path": ("PathOptions", "trace_path"),
     "equilibrium.sensitivities": ("Sensitivities",),
     "search.result": ("KitResult",),
+    "analysis.model_sensitivities": ("ModelSensitivities",),
     "analysis.simulation": ("SimulationResult", "simulate"),
     "io.datasets": ("load_designs",),
     "io.designs": ("load_design",),

@@ -26,6 +26,7 @@ EXAMPLES = """examples:
   kop simulate design.json --json > state.json
   kop simulate models/grids/01_dome.json --gravity
   kop simulate design.json --gravity=0,0,-9810
+  kop simulate models/grids/01_dome.json --gravity --sensitivities
   kop simulate models/umbrellas/hill.json --engine exudyn"""
 
 
@@ -63,6 +64,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "Exudyn itself, from the same starts, which takes many times as long (default: "
         "%(default)s)",
     )
+    parser.add_argument(
+        "--sensitivities",
+        action="store_true",
+        help="say how energy, stress, deviation and, under loads, deflection change for 1 %% more "
+        "of every modulus, density and dimension of a section, and of the loads",
+    )
     add_json(
         parser,
         "print JSON for other programs, joint positions included; of a simulation that fails, "
@@ -73,6 +80,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from dataclasses import replace
 
+    from ..analysis.model_sensitivities import ModelSensitivities
     from ..analysis.simulation import simulate
     from ..errors import SimulationFailure
     from ..files.json_files import to_json
@@ -88,7 +96,10 @@ def run(args: argparse.Namespace) -> int:
         changes["gravity"] = _gravity(design, args)
     loads = replace(design.loads, **changes) if changes else None
     try:
-        result = simulate(design, loads, engine=args.engine).to_dict()
+        found = simulate(design, loads, engine=args.engine)
+        result = found.to_dict()
+        if args.sensitivities:
+            result["sensitivities"] = ModelSensitivities(found, found.loaded is not None).table()
     except SimulationFailure as failure:
         if args.json:
             sys.stdout.write(to_json({"design": design.name, "failed": str(failure)}))
@@ -152,6 +163,10 @@ def _summary(result: dict, units: Units | None) -> str:
         rows |= _under_load(result["loaded"], units)
     for name, check in result.get("load_cases", {}).items():
         rows[f"load case {name}"] = _carried(check, units)
+    for row in result.get("sensitivities", ()):
+        shares = [f"{k} {row[k]:+.2f} %" for k in ("energy", "stress", "deflection") if k in row]
+        shares.append(f"deviation {row['deviation']:+.4f} % of the size")
+        rows[f"1 % more {row['parameter']} ({row['of']})"] = ", ".join(shares)
     width = max(15, *map(len, rows))
     return "".join(f"{name:<{width}} {value}\n" for name, value in rows.items())
 

@@ -18,7 +18,7 @@ from ..errors import InputError
 _LARGEST = 1e60  # its fourth power is still a number
 # Odd terms of the torsion series; the remainder of n terms falls with n^-5, so this many reach
 # round-off.
-_TORSION_TERMS = np.arange(1, 400, 2)
+TORSION_TERMS = np.arange(1, 400, 2)
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def rectangle(width: float, height: float) -> Section:
     check_positive("section.width", width, below=_LARGEST)
     check_positive("section.height", height, below=_LARGEST)
     b, a = sorted((width, height))
-    n = _TORSION_TERMS
+    n = TORSION_TERMS
     ratio = n * np.pi * a / (2 * b)
     torsion = a * b**3 / 3 * (1 - 192 * b / (np.pi**5 * a) * np.sum(np.tanh(ratio) / n**5))
     # largest shear stress, at the middle of the longer side: tau = G theta b (1 - 8/pi^2 sum 1/(n^2

@@ -72,7 +72,7 @@ class LoadBound:
         self._supports = design.joints[supports]
         dofs = (6 * self._supports[:, None] + np.arange(3)).ravel()
         self._moved = np.setdiff1d(dofs, held.driven.dofs)
-        self._scene = _with_places(held, self._moved)
+        self._scene = with_places(held, self._moved)
         self._nodes = np.unique(self._scene.node_body)
         bounded = case.deflection.allowed(1.0) < np.inf
         factors = {case.factor, *((1.0,) if bounded else ())}
@@ -226,7 +226,7 @@ class LoadBound:
         return found + ([self._deflection] if asked.deflection else [])
 
 
-def _with_places(scene: Scene, dofs: np.ndarray) -> Scene:
+def with_places(scene: Scene, dofs: np.ndarray) -> Scene:
     """A scene in which some pinned unknowns are parameters of their own, after all others."""
     pinned, old = scene.pinned.copy(), scene.driven
     pinned[dofs] = False

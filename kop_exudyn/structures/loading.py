@@ -24,6 +24,7 @@ from ..errors import InputError, SimulationFailure
 from ..rods.sections import Section
 from ..scene.loads import DeadForces, Scaled, with_self_weight
 from ..scene.scene import Scene
+from ..scene.terms import SceneTerm
 from .base import Design
 from .loads import LoadCase, hold_in_place, tributary_areas
 from .strength import Strength, material_values, materials_of, rod_strength
@@ -227,16 +228,27 @@ def loaded_scene(
     design: Design, scene: Scene, unloaded: Equilibrium, case: LoadCase, share: float
 ) -> Scene:
     """The held scene with a share of the loads, which may be more than all of them."""
-    terms = list(scene.terms)
+    scene, acting = acting_loads(design, scene, unloaded, case, share)
+    return scene.with_terms(*scene.terms, *(term for terms in acting.values() for term in terms))
+
+
+def acting_loads(
+    design: Design, scene: Scene, unloaded: Equilibrium, case: LoadCase, share: float
+) -> tuple[Scene, dict[str, list[SceneTerm]]]:
+    """The held scene with a share of the weights, and by the names of a case's fields the dead
+    forces of what acts on joints and on pieces that don't bend, in the order in which
+    `loaded_scene` adds them."""
+    acting: dict[str, list[SceneTerm]] = {}
     if len(case.joints):
-        terms.append(Scaled(DeadForces(design.joints[case.joints], case.forces), share))
+        forces = DeadForces(design.joints[case.joints], case.forces)
+        acting["forces"] = [Scaled(forces, share)]
     if case.area is not None or case.plan is not None:
-        forces = case.on_joints(*tributary_areas(design.target.positions))
-        terms.append(Scaled(DeadForces(design.joints, forces), share))
+        spread = case.on_joints(*tributary_areas(design.target.positions))
+        acting["area"] = [Scaled(DeadForces(design.joints, spread), share)]
     if case.line is not None:
         own = np.broadcast_to(share * case.line, (len(scene.elements), 3))
         scene = replace(scene, weight=own if scene.weight is None else scene.weight + own)
-        terms += _on_rigid(scene, unloaded, lambda section: 1.0, share * case.line)
+        acting["line"] = [*_on_rigid(scene, unloaded, lambda section: 1.0, share * case.line)]
     if case.gravity is not None and case.gravity.any():
         materials = materials_of(design)
         density = material_values(scene, materials, "density")
@@ -247,10 +259,10 @@ def loaded_scene(
                 field="material.density",
             )
         scene = with_self_weight(scene, density, share * case.gravity)
-        terms += _rigid_weight(
-            scene, unloaded, max(materials, key=lambda m: m.young).density, share * case.gravity
-        )
-    return scene.with_terms(*terms)
+        stiffest = max(materials, key=lambda m: m.young)
+        weight = _rigid_weight(scene, unloaded, stiffest.density, share * case.gravity)
+        acting["gravity"] = [*weight]
+    return scene, acting
 
 
 def _rigid_weight(

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..equilibrium.equilibria import Equilibrium
 from ..equilibrium.sensitivities import Sensitivities
+from ..rods.section_slopes import SectionSlope
 from ..rods.sections import Section
 from ..scene.scene import Scene
 from .base import Design
@@ -38,7 +39,7 @@ class Rows:
 
 
 @dataclass(frozen=True)
-class _Places:
+class Places:
     """A section's corners at some ends of some elements, and its middle.
 
     elements : (n,);  ends : where along the elements, in lengths from their middle
@@ -97,6 +98,45 @@ class _Places:
         size = np.hypot(normal, shear)
         return (normal * normal_s + shear * shear_s) / size, normal * normal_L / size
 
+    def section_slope(
+        self, stress: np.ndarray, length: float, place: int, by: SectionSlope
+    ) -> float:
+        """Derivative of one place's equivalent stress in a dimension of the section, for given
+        generalised stresses (6,)."""
+        section = self.section
+        N, Qy, Qz, Mt, My, Mz = stress
+        twist = section.torsion_modulus / section.torsion
+        twist_d = by.torsion_modulus / section.torsion - twist * by.torsion / section.torsion
+        shear, shear_d = _SHEAR * abs(Mt) * twist, _SHEAR * abs(Mt) * twist_d
+        axial, axial_d = N / section.area, -N * by.area / section.area**2
+        if place == self.corners * len(self.ends):
+            across = _SHEAR * TRANSVERSE * np.hypot(Qy, Qz) / section.area
+            shear, shear_d = shear + across, shear_d - across * by.area / section.area
+            normal, normal_d = axial, axial_d
+        else:
+            end = self.ends[place // self.corners]
+            corner = place % self.corners
+            y, z = section.outline[corner] - section.centre
+            outline = np.broadcast_to(by.outline, section.outline.shape)
+            y_d, z_d = outline[corner] - by.centre
+            a, b = z / section.inertia_y, y / section.inertia_z
+            a_d = (z_d - a * by.inertia_y) / section.inertia_y
+            b_d = (y_d - b * by.inertia_z) / section.inertia_z
+            My, My_d = My - N * section.centre[1], -N * by.centre[1]
+            Mz, Mz_d = Mz + N * section.centre[0], N * by.centre[0]
+            My, Mz = My + end * length * Qz, Mz - end * length * Qy
+            normal = axial + My * a - Mz * b
+            normal_d = axial_d + My * a_d + My_d * a - Mz * b_d - Mz_d * b
+        return float((normal * normal_d + shear * shear_d) / np.hypot(normal, shear))
+
+
+def places_of(scene: Scene) -> list[Places]:
+    """All places of a scene's rods at which stress is looked at: sections, and what joints leave
+    of them."""
+    whole = [Places(section, elements, (-0.5, 0.5)) for section, elements in by_section(scene)]
+    cut = [Places(section, elements, (end,)) for section, elements, end in cut_ends(scene)]
+    return [*whole, *cut]
+
 
 class StressBound:
     """Utilisation in one scene of a design; elements without section or elastic limit have none.
@@ -108,11 +148,9 @@ class StressBound:
         self.scene = scene
         limit = material_values(scene, materials_of(design), "elastic_limit", np.fmin)
         self._allowed = limit / safety
-        whole = [_Places(section, elements, (-0.5, 0.5)) for section, elements in by_section(scene)]
-        cut = [_Places(section, elements, (end,)) for section, elements, end in cut_ends(scene)]
         known = [
-            _Places(p.section, p.elements[np.isfinite(limit[p.elements])], p.ends)
-            for p in (*whole, *cut)
+            Places(p.section, p.elements[np.isfinite(limit[p.elements])], p.ends)
+            for p in places_of(scene)
         ]
         self._places = [places for places in known if len(places.elements)]
 
