@@ -78,7 +78,7 @@ def _followed(
     subject: Design, path: WatchedPath | SimulationFailure, relaxed: StageResult, weight: float
 ) -> dict[str, Any]:
     case: dict[str, Any] = {
-        "parts": dict(relaxed.kit.sizes),
+        "parts": dict(sorted(relaxed.kit.sizes.items(), reverse=True)),  # linear first
         "weight": weight,
         "relaxed %": relaxed.evaluations[0].fit.max_percent,
     }
@@ -223,7 +223,7 @@ def draw_map(cases: Sequence[Case]) -> Figure:
             xlim=(-0.5, len(weights) - 0.5),
             ylim=(len(kits) - 0.5, -0.5),
             xlabel="weight $w_c$ of the projection",
-            ylabel="parts: linear + angular",
+            ylabel="parts: " + " + ".join(kind for kind, _ in kits[0]),
         )
         ax.set_xticks(
             range(len(weights)), [f"$10^{{{round(np.log10(weight))}}}$" for weight in weights]

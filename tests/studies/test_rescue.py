@@ -28,7 +28,13 @@ def test_nothing_fails():
     assert not any(map(fails, cases))
     assert finding_of(cases).startswith("In none of 2 cases")
     assert example(cases) is cases[1]
-    draw_paths([example(cases)]), draw_map(cases)
+    draw_paths([example(cases)])
+    (axes,) = draw_map(cases).axes
+    order = list(cases[0]["parts"])  # of the numbers that stand at the rows
+    assert axes.get_ylabel() == "parts: " + " + ".join(order)
+    assert [tick.get_text() for tick in axes.get_yticklabels()] == [
+        " + ".join(str(cases[0]["parts"][kind]) for kind in order)
+    ]
 
 
 def test_the_largest_snap_is_shown_and_rescues_are_counted():
