@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 from dataclasses import replace
 
@@ -65,6 +66,38 @@ def test_a_design_that_is_moved_and_turned_is_the_same(model, sizes, allowed):
         assert found.elastic_energy == pytest.approx(state.elastic_energy, rel=1e-6)
         lengths = np.abs(other.parameters - design.parameters)
         assert lengths.max() < 1e-12 * size + 1e-13 * sizes * size
+
+
+@pytest.fixture(scope="module", params=["conformals/04_cubic.json", "patches/ring.json"])
+def saddle(request, repository):
+    data = json.loads((repository / "models" / request.param).read_text())
+    return data, risen(data)
+
+
+def risen(data):
+    """Joints (n, 3) of a smooth C-shell when it is open, around their middle."""
+    design = design_from_dict(data)
+    x = design.smooth_path[-1].state.positions[design.joints]
+    return x - x.mean(axis=0)
+
+
+@pytest.mark.parametrize("seed", [0, 2, "mirrored"])
+def test_saddles_rise_to_the_same_side_however_they_are_turned(saddle, seed):
+    """Their two sides are alike but for the mirror image: nothing but the choice tells them
+    apart."""
+    data, here = saddle
+    if seed == "mirrored":
+        turned, motion = copy.deepcopy(data), Placement(np.diag([-1.0, 1.0, 1.0]), np.zeros(3))
+        for curve in turned["curves"]:
+            curve["points"] = [[-x, y] for x, y in curve["points"]]
+        turned["opening"]["angle"] *= -1
+    else:
+        turned, motion, _ = placed(data, 0.0, seed)
+    there = risen(turned)
+    assert np.abs(here[:, 2]).max() > 0.02  # where the other side would be twice that away
+    # the mean angle of all hinges holds the shape, but not its turn in the plane
+    turn, off = Rotation.align_vectors(there, here @ motion.rotation.T)
+    assert off < 1e-8 and abs(turn.as_matrix()[2, 2] - 1) < 1e-12
 
 
 @settings(max_examples=3, deadline=None, derandomize=True)

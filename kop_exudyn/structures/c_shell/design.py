@@ -61,6 +61,7 @@ _REFINEMENTS = 3  # of the target's triangles
 _INWARD, _SLIVER = 1e-6, 1e-9  # of the way to the middle
 _STRETCH = 1e-7  # tells equally good triangulations apart
 _ARM = 0.37  # of the longest: one that gives a net its direction
+_ODD_ANGLE = np.radians(150)  # with it no model is near to being undecided
 
 
 class CShell(Design):
@@ -303,12 +304,33 @@ def open_up(
 
 def _bulge(x: np.ndarray) -> np.ndarray:
     """A height field (n,) that no symmetric buckling mode, even or odd, is orthogonal to: for
-    choosing a side."""
-    y = (x[:, :2] - x[:, :2].mean(axis=0)) / np.ptp(x[:, :2], axis=0).max()
+    choosing a side. It turns with the net, and is mirrored with it, so that a saddle, whose two
+    sides are alike, rises to the same one wherever it is drawn."""
+    y = (x[:, :2] - x[:, :2].mean(axis=0)) @ _own_axes(x[:, :2]).T
+    y = y / np.hypot(*y.T).max()
     r = (y**2).sum(axis=1)
-    odd = r * (0.5 * y[:, 0] + 0.3 * y[:, 1])
-    height = r + 0.7 * (y[:, 0] ** 2 - y[:, 1] ** 2) + 0.3 * y[:, 0] * y[:, 1] + odd
+    height = r + 0.7 * (y[:, 0] ** 2 - y[:, 1] ** 2) + r * (0.3 * y[:, 0] + 0.18 * y[:, 1])
     return height - height.mean()
+
+
+def _own_axes(flat: np.ndarray) -> np.ndarray:
+    """Axes (2, 2) that turn with a net (n, 2) and are mirrored with it: by its first points that
+    are far from its middle, and from the line there, at an angle that is no symmetric net's."""
+    arms = flat - flat.mean(axis=0)
+    along = _first_arm(flat)
+    along = along / np.hypot(*along)
+    off = along[0] * arms[:, 1] - along[1] * arms[:, 0]
+    side = np.sign(off[np.argmax(np.abs(off) > _ARM * np.abs(off).max())])
+    across = side * np.array([-along[1], along[0]])
+    c, s = np.cos(_ODD_ANGLE), np.sin(_ODD_ANGLE)
+    return np.array([c * along + s * across, c * across - s * along])
+
+
+def _first_arm(flat: np.ndarray) -> np.ndarray:
+    """From the middle of a net (n, 2) to its first point that is far from there."""
+    arms = flat - flat.mean(axis=0)
+    lengths = np.hypot(*arms.T)
+    return arms[np.argmax(lengths > _ARM * lengths.max())]
 
 
 def _untied(flat: np.ndarray) -> np.ndarray:
@@ -316,9 +338,7 @@ def _untied(flat: np.ndarray) -> np.ndarray:
     circle, as those of symmetric nets do, off it: so that they are triangulated in the same way
     however a net (n, 2) is turned. Lines stay lines. It stretches along a direction that turns with
     the net, at an odd angle to it."""
-    arms = flat - flat.mean(axis=0)
-    lengths = np.linalg.norm(arms, axis=1)
-    first = arms[np.argmax(lengths > _ARM * lengths.max())]
+    first = _first_arm(flat)
     angle = np.arctan2(first[1], first[0]) + 0.7
     along = np.array([np.cos(angle), np.sin(angle)])
     return np.eye(2) + _STRETCH * np.outer(along, along)
