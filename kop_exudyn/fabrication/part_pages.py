@@ -18,8 +18,9 @@ from .templates import plate_template, strip_template
 _COLOURS = {CUT: INK, ENGRAVE: QUIET, NOTES: FAINT}
 _DIMENSION = 6.0  # points
 _STEP = 3.0  # mm between dimensions that stand side by side
-_STRIPS_A_PAGE = 5  # at least
+_STRIPS_A_PAGE = 5  # at least, where the paper is high enough
 _STRIP_ROOM = 34.0  # mm of a page below and above a strip: caption and dimensions
+_STRIP_LEAST = 12.0  # mm of a page that a strip itself has at least
 
 
 def strip_pages(book: Book, blanks: Blanks) -> None:
@@ -29,7 +30,8 @@ def strip_pages(book: Book, blanks: Blanks) -> None:
         return
     longest = max(strip.cut_length for strip in strips)
     room = Page(book.paper, "").room
-    height = room[1] / _STRIPS_A_PAGE - _STRIP_ROOM
+    down = max(1, min(_STRIPS_A_PAGE, int(room[1] // (_STRIP_ROOM + _STRIP_LEAST))))
+    height = room[1] / down - _STRIP_ROOM
     size = np.array([longest, strips[0].board.breadth])
     scale = fitting_scale(size, np.array([room[0] - 10.0, height]))
     page, y = None, 0.0

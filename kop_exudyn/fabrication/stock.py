@@ -80,9 +80,16 @@ def cut_from_bars(
     stock : lengths of bars, as many as wanted of each
     kerf : lost between two pieces of a bar
 
-    Raises InputError where a piece is longer than every bar.
+    Raises InputError where a piece is longer than every bar, or has no length.
     """
     size, demand, bars = np.array(lengths, float), np.array(counts, int), np.unique(stock)
+    if not size.min() > 0:
+        shortest = int(size.argmin())
+        raise InputError(
+            f"nothing is left of part {labels[shortest]} between its corners: it would be "
+            f"{size[shortest]:.1f} mm long",
+            field="parts",
+        )
     if size.max() > bars[-1]:
         longest = int(size.argmax())
         raise InputError(
