@@ -19,10 +19,10 @@ from ..equilibrium.newton import NewtonOptions, solve
 from ..equilibrium.system import System
 from ..errors import SimulationFailure
 from ..scene.scene import Scene
-from ..search.stage_results import SAME_STATE
 from ..structures.base import Design
 from ..structures.loading import LoadedState, held_scene, loaded_scene, loaded_state
 from ..structures.loads import LoadCase
+from ..structures.opening import SAME_STATE
 from ..structures.strength import materials_of, rod_strength
 from ..structures.thickness import resolved, thickened_scene
 
