@@ -6,6 +6,7 @@ import json
 import logging
 from pathlib import Path
 
+import hypothesis
 import numpy as np
 import pytest
 
@@ -13,6 +14,13 @@ from kop_exudyn.compiled.library import OFF, library
 from kop_exudyn.fabrication.pieces import parts_list
 from kop_exudyn.kit.cluster import cluster
 from kop_exudyn.structures.base import design_from_dict
+from kop_exudyn.structures.stacking import stacked_groups, stacked_parameters
+
+# how long an example takes says how busy the machine is
+hypothesis.settings.register_profile(
+    "unhurried", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
+)
+hypothesis.settings.load_profile("unhurried")
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 
@@ -128,12 +136,8 @@ def shells():
 @pytest.fixture(scope="session")
 def clustering(shells):
     """Kit and assignment of all elements of both shells."""
-    offsets = np.cumsum([0, *(len(design.parameters) for design in shells)])
-    groups = [
-        group.shifted(offset) for design, offset in zip(shells, offsets) for group in design.groups
-    ]
     return cluster(
-        groups, np.concatenate([d.parameters for d in shells]), {"linear": 3, "angular": 2}, seed=1
+        stacked_groups(shells), stacked_parameters(shells), {"linear": 3, "angular": 2}, seed=1
     )
 
 

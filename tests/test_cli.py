@@ -6,7 +6,6 @@ import logging
 import re
 import subprocess
 import sys
-import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -123,19 +122,17 @@ class TestHelp:
         assert status_of("--version") == 0
         assert capsys.readouterr().out == f"kop_exudyn {__version__}\n"
 
-    def test_help_is_quick_and_loads_no_library(self):
+    def test_help_loads_no_library(self):
+        """So that it is there at once: the time that it takes is that of its imports."""
         code = (
             "import sys\nfrom kop_exudyn.cli import make_parser\nmake_parser().format_help()\n"
             "print(*(m for m in ('numpy', 'scipy', 'exudyn', 'matplotlib', 'jsonschema', 'shtab') "
-            "if m in sys.modules))"
+            "if m in sys.modules), sum(m.startswith('kop_exudyn') for m in sys.modules))"
         )
-        begin = time.perf_counter()
         done = subprocess.run(
             [sys.executable, "-c", code], capture_output=True, text=True, check=True
         )
-        assert done.stdout.strip() == ""
-        # a tenth of a second on an idle machine; this one may be busy
-        assert time.perf_counter() - begin < 3
+        assert int(done.stdout) < 30
 
     def test_as_a_module(self):
         done = subprocess.run(

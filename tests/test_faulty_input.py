@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.shells import shell_data
 
 from kop_exudyn import cli
 from kop_exudyn.files.arrays import load_arrays, save_arrays, sealed, unsealed
@@ -31,23 +32,6 @@ KIT = {"format": "kop_exudyn/kit", "version": 1}
 STOCK = "kind,count,l1,l2,angle\n"
 
 
-def shell(name: str, **changes) -> dict:
-    along = [[[-1.2, y - 0.1], [0, y], [1.2, y - 0.1]] for y in (-0.5, 0.4)]
-    across = [[[x, -0.9], [x * 1.1 + 0.02, 0], [x, 0.9]] for x in (-0.8, 0.05, 0.7)]
-    data = {
-        "format": "kop_exudyn/design",
-        "version": 1,
-        "class": "c_shell",
-        "name": name,
-        "opening": {"angle": 0.3},
-        "free_ends": False,
-        "material": {"young": 2.1e9, "poisson": 0.35, "elastic_limit": 4e7},
-        "section": {"type": "rectangle", "width": 0.03, "height": 0.004},
-        "curves": [{"type": "spline", "points": points} for points in along + across],
-    }
-    return data | changes
-
-
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
     """A folder of all files that the cases name, with a finished run of one design."""
@@ -60,7 +44,7 @@ def place(tmp_path_factory):
             content = (content if isinstance(content, str) else json.dumps(content)).encode()
         path.write_bytes(content)
 
-    write("designs/one.json", shell("one"))
+    write("designs/one.json", shell_data("one"))
     write("study.toml", STUDY + QUICK)
     asked = ["optimize", str(folder / "study.toml"), "--out", str(folder / "run"), "--jobs", "1"]
     assert cli.main([*asked, "--quiet"]) == 0
@@ -70,10 +54,10 @@ def place(tmp_path_factory):
         "bytes.json": bytes(range(256)),
         "array.json": "[1, 2]",
         "other.json": {"type": "FeatureCollection", "features": []},
-        "class.json": shell("x", **{"class": "c_shel"}),
-        "classlist.json": shell("x", **{"class": ["c_shell"]}),
-        "nan.json": json.dumps(shell("x")).replace("0.35", "NaN"),
-        "future.json": shell("x", version=99),
+        "class.json": shell_data("x", **{"class": "c_shel"}),
+        "classlist.json": shell_data("x", **{"class": ["c_shell"]}),
+        "nan.json": json.dumps(shell_data("x")).replace("0.35", "NaN"),
+        "future.json": shell_data("x", version=99),
         "broken.json.gz": b"\x1f\x8b\x08nothing",
         "text.txt": "hello",
         "net.obj": NET,

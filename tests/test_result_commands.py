@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from pypdf import PdfReader
 from support.settings import ONE_STEP
+from support.shells import shell_data
 
 from kop_exudyn.cli import main
 from kop_exudyn.io.datasets import load_designs
@@ -20,22 +21,6 @@ from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.report.kit_run import optimize_and_report
 from kop_exudyn.report.viewer_scenes import kit_scene
 from kop_exudyn.search.settings import JobSettings
-
-
-def shell(name: str, bow: float) -> dict:
-    along = [[[-1.2, y - bow], [0, y], [1.2, y - 0.1]] for y in (-0.5, 0.4)]
-    across = [[[x, -0.9], [x * 1.1 + bow / 5, 0], [x, 0.9]] for x in (-0.8, 0.05, 0.7)]
-    return {
-        "format": "kop_exudyn/design",
-        "version": 1,
-        "class": "c_shell",
-        "name": name,
-        "opening": {"angle": 0.3},
-        "free_ends": False,
-        "material": {"young": 2.1e9, "poisson": 0.35, "elastic_limit": 4e7},
-        "section": {"type": "rectangle", "width": 0.03, "height": 0.004},
-        "curves": [{"type": "spline", "points": points} for points in along + across],
-    }
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +31,7 @@ def run(tmp_path_factory):
     (folder / "designs").mkdir()
     for name, bow in (("flat", 0.1), ("bent", 0.16), ("unused", 0.2)):
         (folder / "designs" / f"{name}.json").write_text(
-            json.dumps(shell(name, bow)), encoding="utf-8"
+            json.dumps(shell_data(name, bow)), encoding="utf-8"
         )
     optimize_and_report(
         load_designs(folder / "designs", ["flat", "bent"]),

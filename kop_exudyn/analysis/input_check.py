@@ -23,6 +23,7 @@ from ..kit.groups import ElementGroup
 from ..kit.kinds import part_kind
 from ..search.input_fit import fit_input
 from ..structures.base import Design, can_be_rescaled
+from ..structures.stacking import group_designs, stacked_groups, stacked_parameters
 from .simulation import simulate
 
 OFF_TARGET = 1.0  # %: inputs that deviate more than this blame the kit
@@ -204,11 +205,8 @@ def _stacked(
     designs: Sequence[Design], sizes: Mapping[str, float] | None = None
 ) -> tuple[list[ElementGroup], np.ndarray, np.ndarray]:
     """Groups, parameters at these sizes (default: 1), and the number of each group's design."""
-    offsets = np.cumsum([0, *(len(design.parameters) for design in designs)])
-    groups = [g.shifted(o) for design, o in zip(designs, offsets) for g in design.groups]
-    q = np.concatenate([design.parameters for design in designs]).astype(float)
-    counts = [len(design.groups) for design in designs]
-    owner = np.repeat(np.arange(len(designs)), counts)
+    groups, owner = stacked_groups(designs), group_designs(designs)
+    q = stacked_parameters(designs).astype(float)
     for group, number in zip(groups, owner.tolist()):
         if sizes is not None and not part_kind(group.kind).angular:
             q[group.indices] *= sizes[designs[number].name]

@@ -23,6 +23,7 @@ from ..search.result import INPUT, REDEPLOYED, STAGES, KitResult
 from ..search.stage_results import Jump, StageResult
 from ..structures.base import Design, Role
 from ..structures.serving import served_by
+from ..structures.stacking import parameter_offsets, stacked_groups, stacked_parameters
 from .results import load_result, load_states
 
 _LAST = "assigned"
@@ -50,15 +51,11 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
     designs = _named(designs, [design["name"] for design in data["designs"]], path)
     kit = Kit.from_dict(data["kit"], source=str(path))
     designs = served_by(designs, kit.sizes)
-    offsets = np.cumsum([0, *(len(design.parameters) for design in designs)])
-    groups = [
-        group.shifted(start) for design, start in zip(designs, offsets) for group in design.groups
-    ]
+    groups, offsets = stacked_groups(designs), parameter_offsets(designs)
     assignment = Assignment.from_dict(
         data["assignment"], groups, int(offsets[-1]), kit, source=str(path)
     )
-    inputs = np.concatenate([design.parameters for design in designs])
-    realised = np.split(assignment.realise(kit, inputs), offsets[1:-1])
+    realised = np.split(assignment.realise(kit, stacked_parameters(designs)), offsets[1:-1])
     references = [_reference(design, states) for design in designs]
     try:
         weights = _weights(data["settings"], designs)

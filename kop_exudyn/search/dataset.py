@@ -17,6 +17,7 @@ from ..kit.kinds import Bounds, part_kind
 from ..scene.state import State
 from ..sqp.model import penalty_of
 from ..structures.base import Design
+from ..structures.stacking import group_designs, parameter_offsets, stacked_groups
 from .objective import DesignDerivatives, DesignObjective, Evaluation, Reference, Weights
 from .pool import DesignPool
 from .requirements import Requirements
@@ -93,19 +94,17 @@ class Dataset:
     @property
     def offsets(self) -> np.ndarray:
         """(n_designs + 1,) where each design's parameters start."""
-        return np.cumsum([0] + [len(d.parameters) for d in self.designs])
+        return parameter_offsets(self.designs)
 
     @property
     def groups(self) -> list[ElementGroup]:
         """All elements, indexing the long parameter vector; design by design."""
-        return [
-            g.shifted(offset) for d, offset in zip(self.designs, self.offsets) for g in d.groups
-        ]
+        return stacked_groups(self.designs)
 
     @property
     def group_designs(self) -> np.ndarray:
         """(n_groups,) the place in this dataset of each group's design."""
-        return np.repeat(np.arange(len(self.designs)), [len(d.groups) for d in self.designs])
+        return group_designs(self.designs)
 
     @property
     def parameters(self) -> np.ndarray:

@@ -16,6 +16,7 @@ from ..kit.reuse import PieceCount
 from ..structures.base import Design
 from ..structures.deviation import fit_summary
 from ..structures.fitting import TargetFitting
+from ..structures.stacking import group_designs
 from ..structures.strength import strength_summary
 from ..units import Units, common_units
 from .events import Stage, StageEvent, events_to_list
@@ -105,8 +106,7 @@ class KitResult:
 
     def piece_count(self) -> PieceCount:
         """The pieces of every part by design, and how many have to be made."""
-        owners = np.repeat(np.arange(len(self.designs)), [len(d.groups) for d in self.designs])
-        return PieceCount(self.kit, self.assignment, owners)
+        return PieceCount(self.kit, self.assignment, group_designs(self.designs))
 
     def summary(self, stage: str, number: int) -> dict[str, Any]:
         """Fit, energy and confirmation of one design after a stage, or {"failed": why}."""

@@ -20,6 +20,12 @@ from ..kit.parts import Kit
 from ..kit.stock import Missing, Stock
 from ..structures.base import Design
 from ..structures.serving import served_by
+from ..structures.stacking import (
+    group_designs,
+    parameter_offsets,
+    stacked_groups,
+    stacked_parameters,
+)
 from ..units import common_units, unnamed_units
 from .assigned import opened_stage
 from .checkpoints import NoStore, Store
@@ -194,23 +200,18 @@ def check_request(
     if kit is not None:
         given = kit.kit.units if isinstance(kit, Stock) else kit.units
         common_units({"the kit": given, "the designs": units}, "designs and kits")
-    offsets = np.cumsum([0, *(len(design.parameters) for design in designs)])
-    constraints = settings.stages.constraints
-    if constraints is not None and constraints.A.shape[1] != offsets[-1]:
+    constraints, n_q = settings.stages.constraints, parameter_offsets(designs)[-1]
+    if constraints is not None and constraints.A.shape[1] != n_q:
         raise InputError(
-            f"are on {constraints.A.shape[1]} parameters, the designs have {offsets[-1]}",
+            f"are on {constraints.A.shape[1]} parameters, the designs have {n_q}",
             field="constraints",
         )
     if isinstance(kit, Kit):
         _check_kinds(designs, kit)
         return
-    groups = [
-        group.shifted(offset) for design, offset in zip(designs, offsets) for group in design.groups
-    ]
-    q = np.concatenate([design.parameters for design in designs])
+    groups, q = stacked_groups(designs), stacked_parameters(designs)
     if isinstance(kit, Stock):
-        design_of = np.repeat(np.arange(len(designs)), [len(d.groups) for d in designs])
-        missing = kit.missing(groups, q, design_of)
+        missing = kit.missing(groups, q, group_designs(designs))
         if missing:
             raise InputError(_lacks(missing, designs, kit), field="stock")
         return

@@ -15,6 +15,7 @@ from kop_exudyn.fabrication.options import CutOptions
 from kop_exudyn.fabrication.pieces import parts_list
 from kop_exudyn.kit.cluster import cluster
 from kop_exudyn.structures.base import design_from_dict
+from kop_exudyn.structures.stacking import stacked_groups, stacked_parameters
 
 MM = 0.1
 
@@ -38,9 +39,7 @@ def grids_case():
         )
         for name, a, b in (("vault", -0.3, -0.05), ("saddle", -0.2, 0.2))
     ]
-    offsets = np.cumsum([0, *(len(design.parameters) for design in designs)])
-    groups = [g.shifted(at) for d, at in zip(designs, offsets) for g in d.groups]
-    q = np.concatenate([design.parameters for design in designs])
+    groups, q = stacked_groups(designs), stacked_parameters(designs)
     found = cluster(groups, q, {"linear": 4, "angular": 3}, seed=2)
     return designs, parts_list(found.kit, found.assignment, designs)
 

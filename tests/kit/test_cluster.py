@@ -1,7 +1,6 @@
 """Clustering: against brute force, its invariances, and degenerate inputs."""
 
 import itertools
-import time
 
 import numpy as np
 import pytest
@@ -185,7 +184,7 @@ def test_slits_shrink_with_their_cost():
     assert cluster(groups, q, {"slit": 3}).energy["slit"] < plain.energy["linear"]
 
 
-def test_published_size_is_quick():
+def test_more_restarts_of_the_published_size_are_no_worse():
     rng = np.random.default_rng(0)
     q = np.concatenate([rng.uniform(1, 3, 1440), rng.uniform(-1, 1, 720)])
     groups = [
@@ -193,10 +192,11 @@ def test_published_size_is_quick():
         ElementGroup("linear", np.arange(1260, 1440)[:, None]),
         ElementGroup("angular", np.arange(1440, 2160)[:, None]),
     ]
-    cluster(groups, q, {"linear": 2, "angular": 2}, restarts=1)
-    start = time.process_time()
-    cluster(groups, q, {"linear": 20, "angular": 5}, restarts=20)
-    assert time.process_time() - start < 3.0
+    sizes = {"linear": 20, "angular": 5}
+    once, often = (cluster(groups, q, sizes, restarts=n, seed=1).energy for n in (1, 20))
+    for kind in sizes:
+        assert 0 < often[kind] <= once[kind]
+    assert sum(often.values()) < sum(once.values())
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -93,7 +93,7 @@ def fuzz(
     """Read one mutated file for every seed.
 
     folder : for scratch files
-    seconds : for one file; megabytes : by which the process may grow at most
+    seconds : of processor time for one file; megabytes : by which the process may grow at most
     """
     files = corpus(folder)
     names = sorted(files)
@@ -132,7 +132,7 @@ def _written(folder: Path, name: str, content: bytes) -> Path:
 
 
 def _read(seed: int, name: str, path: Path, result: FuzzResult, seconds: float) -> None:
-    begin = perf_counter()
+    begin = process_time()
     result.count += 1
     try:
         with time_limit(seconds), np.errstate(all="ignore"):
@@ -157,4 +157,4 @@ def _read(seed: int, name: str, path: Path, result: FuzzResult, seconds: float) 
     if Tripwire.sprung:
         result.findings.append(Finding(seed, name, "pickle", "a pickle was loaded"))
         Tripwire.sprung = False
-    result.slowest = max(result.slowest, (perf_counter() - begin, seed, name))
+    result.slowest = max(result.slowest, (process_time() - begin, seed, name))
