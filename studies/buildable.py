@@ -105,11 +105,15 @@ def required(
     case: KitCase, level: str, requirements: Requirements, study: Study
 ) -> tuple[KitCase, Path]:
     """A case under a requirement, and the folder of its run."""
+    samples = min(requirements.samples, case.stages.requirements.samples)  # quick: few
     stages = replace(
-        case.stages, requirements=requirements, effort="quick", leaps=min(case.stages.leaps, 2)
+        case.stages,
+        requirements=replace(requirements, samples=samples),
+        effort="quick",
+        leaps=min(case.stages.leaps, 2),
     )
     name = f"{case.name} {level.removeprefix('+ ')} required"
-    named = replace(case, name=name, stages=stages, baselines=False)
+    named = replace(case, name=name, stages=stages, baselines=False, published=False)
     return named, run_folder(named, study)
 
 

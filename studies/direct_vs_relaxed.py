@@ -14,14 +14,13 @@ distances of the joints from the target surface, in % of its size.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from kop_exudyn.search.result import STAGES
 from lib.comparison import comparison_rows, finding
 from lib.comparison_page import begin, realised, show
 from lib.study import Study
-from lib.study_kits import kits_of, three_classes
+from lib.study_kits import kits
 
 ROOT = Path(__file__).resolve().parents[1]
 SHOWN = 3  # designs of each class in the pictures: those that gain most
@@ -31,8 +30,7 @@ def main() -> None:
     study = Study.from_command_line(__doc__, __file__)
 
     # 1. One kit a class: all four stages, kept in the folder of runs.
-    cases = three_classes(ROOT / "models", study.quick)
-    results = kits_of(study, [replace(case, published=True) for case in cases])
+    results = kits(study, ROOT / "models")
 
     # 2. What came out, design by design and in a sentence.
     rows = [row for name, result in results.items() for row in comparison_rows(name, result)]

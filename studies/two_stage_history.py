@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from kop_exudyn.analysis.verdict import VerdictSettings
 from kop_exudyn.io.datasets import load_designs, select_files
 from kop_exudyn.report.designs import DrawnDesign, draw_designs
 from kop_exudyn.report.history import draw_history
@@ -23,19 +24,20 @@ from kop_exudyn.report.kit_run import optimize_and_report
 from kop_exudyn.search.settings import JobSettings, StageSettings
 from lib.stage_history import course, course_rows, draw_courses, input_states
 from lib.study import Study
-from lib.study_kits import QUICK_STAGES
+from lib.study_kits import QUICK_STAGES, QUICK_VERDICT
 
-MODELS = Path(__file__).resolve().parents[1] / "models" / "conformals"
+MODELS = Path(__file__).resolve().parents[1] / "models"
 PARTS = {"linear": 12, "angular": 5}
 
 
 def main() -> None:
     study = Study.from_command_line(__doc__, __file__)
     number = 1 if study.quick else 3
-    designs, files = load_designs(MODELS, number), select_files(MODELS, number)
+    models = MODELS / ("small" if study.quick else "conformals")
+    designs, files = load_designs(models, number), select_files(models, number)
 
     # 1. The method as it is, and twice without reassignments, so that only the Hessian differs.
-    method = replace(QUICK_STAGES, schedule=(1e4,)) if study.quick else StageSettings()
+    method = QUICK_STAGES if study.quick else StageSettings()
     plain = (
         method
         if study.quick
@@ -48,6 +50,7 @@ def main() -> None:
             out=study.out / "runs" / name.replace(" ", "_"),
             inputs=files,
             settings=JobSettings(stages=stages, jobs=study.jobs, baselines=False),
+            verdict=QUICK_VERDICT if study.quick else VerdictSettings(),
             resume=study.resume,
             overwrite=True,
         )

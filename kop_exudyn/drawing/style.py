@@ -117,11 +117,12 @@ def with_palette(png: bytes, colours: int) -> bytes:
 def save_figure(
     figure: Figure,
     path: str | Path,
-    suffixes: Sequence[str] = ("svg", "png"),
+    suffixes: Sequence[str] = ("svg",),
     *,
     overwrite: bool = False,
 ) -> list[Path]:
-    """Write PATH.svg, PATH.png, ...; `path` has no ending. InputError when one can't be written."""
+    """Write PATH.svg, and PATH.pdf or PATH.png if asked for; `path` has no ending. InputError when
+    one can't be written."""
     path = Path(path)
     return [
         write_bytes(

@@ -3,14 +3,14 @@ shows them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from PIL import Image
 
 from ..analysis.verdict import Buildable
-from ..drawing.style import save_figure
+from ..drawing.style import figure_bytes
 from ..files.files import make_folder, write_bytes
 from ..io.kits import save_kit
 from ..io.results import save_result, save_states
@@ -69,13 +69,17 @@ def write_kit_report(
     save_result(folder / "result.json", content, overwrite=True)
     save_kit(folder / "kit.json", result.kit, overwrite=True)
     save_states(folder / "states.npz", final_states(result), overwrite=True)
+    # drawn once, for the page and for their own files: at print quality that takes a second each
     figures = {
-        "designs": draw_designs(drawn_designs(result)),
-        "history": draw_history(histories(result)),
-        "parameters": draw_parameters(part_spaces(result)),
+        name: figure_bytes(figure, "svg")
+        for name, figure in {
+            "designs": draw_designs(drawn_designs(result)),
+            "history": draw_history(histories(result)),
+            "parameters": draw_parameters(part_spaces(result)),
+        }.items()
     }
-    for name, figure in figures.items():
-        save_figure(figure, folder / name, overwrite=True)
+    for name, drawn in figures.items():
+        write_bytes(folder / f"{name}.svg", drawn, overwrite=True)
     save_viewer(folder / "viewer.html", kit_scene(result, frames=_FRAMES), overwrite=True)
     pictures = kit_pictures(result)
     names = [design.name for design in result.designs]
@@ -86,7 +90,7 @@ def write_kit_report(
 
 def _page(
     result: KitResult,
-    figures: dict,
+    figures: Mapping[str, bytes],
     pictures: Sequence[Image.Image | None],
     verdicts: Sequence[Buildable],
     extend: Callable[[Page], object],

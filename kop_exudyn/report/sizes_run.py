@@ -9,12 +9,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure
-
 from ..analysis.sizes import KitCost, SizedKit, smallest_kit, trade_off
 from ..analysis.tradeoff import knee
 from ..analysis.verdict import Buildable, VerdictSettings
-from ..drawing.style import save_figure
+from ..drawing.style import figure_bytes
+from ..files.files import write_bytes
 from ..files.json_files import plain, write_json
 from ..files.tables import write_csv
 from ..io.checkpoint import Job
@@ -230,16 +229,16 @@ def _rows(kits: Sequence[SizedKit], cost: KitCost) -> list[dict[str, Any]]:
     return sorted(found, key=lambda row: (row["parts"], -(row["max %"] or float("inf"))))
 
 
-def _written(folder: Path, rows: Sequence[Mapping[str, Any]], at: int | None = None) -> Figure:
-    """Write the table and the figure; gives the figure."""
+def _written(folder: Path, rows: Sequence[Mapping[str, Any]], at: int | None = None) -> bytes:
+    """Write the table and the figure; gives the figure's SVG."""
     write_json(folder / "tradeoff.json", {"kits": list(rows), "knee": at}, overwrite=True)
     write_csv(folder / "tradeoff.csv", rows, overwrite=True)
-    figure = draw_tradeoff(rows, "parts", at)
-    save_figure(figure, folder / "tradeoff", overwrite=True)
+    figure = figure_bytes(draw_tradeoff(rows, "parts", at), "svg")
+    write_bytes(folder / "tradeoff.svg", figure, overwrite=True)
     return figure
 
 
-def _add_table(page: Page, rows: Sequence[Mapping[str, Any]], figure: Figure) -> None:
+def _add_table(page: Page, rows: Sequence[Mapping[str, Any]], figure: bytes) -> None:
     kinds = [name for name in rows[0] if name not in _COLUMNS][: list(rows[0]).index("parts")]
     header = [*kinds, *_COLUMNS]
     page.figure(

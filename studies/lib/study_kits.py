@@ -7,12 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from kop_exudyn.analysis.verdict import VerdictSettings
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.checkpoint import Job
 from kop_exudyn.io.datasets import select_files
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.report.kit_run import optimize_and_report, within_workshop
+from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.result import KitResult
 from kop_exudyn.search.run import described_job
 from kop_exudyn.search.settings import JobSettings, StageSettings
@@ -21,14 +23,22 @@ from .study import Study
 
 RELEASED = ("saddle_5t", "hemisphere_5t", "lilium", "sphere_cap_0.3")
 QUICK_STAGES = StageSettings(
-    relaxed_steps=1,
-    assigned_steps=1,
+    schedule=(1e4,),
+    relaxed_steps=2,
+    assigned_steps=3,
     round_steps=1,
     reassignments=0,
     path_steps=2,
     rescues=0,
     restarts=2,
+    effort="quick",
+    levelling=0,
+    # these two are the published method's as well, which takes its steps whatever is said above
+    last_tolerance=0.1,
+    assigned_tolerance=0.1,
+    requirements=Requirements(samples=2),
 )
+QUICK_VERDICT = VerdictSettings(samples=2)
 
 
 @dataclass(frozen=True)
@@ -40,6 +50,7 @@ class KitCase:
     parts : kind -> number of parts
     baselines : whether the unrelaxed baseline is computed as well
     published : whether the published method is run as well, for comparison
+    verdict : samples of its verdicts
     """
 
     name: str
@@ -48,22 +59,27 @@ class KitCase:
     stages: StageSettings = StageSettings()
     baselines: bool = True
     published: bool = False
+    verdict: VerdictSettings = VerdictSettings()
 
 
 def three_classes(models: Path, quick: bool = False) -> list[KitCase]:
-    """C-shells, grids and umbrella meshes of the repository's models; quick: one design each and
-    hardly any steps."""
+    """C-shells, grids and umbrella meshes of the repository's models, with the published method
+    beside; quick: one design each, a small one, and hardly any steps."""
     stages = QUICK_STAGES if quick else StageSettings()
+    verdict = QUICK_VERDICT if quick else VerdictSettings()
     beams = {"linear": 12, "angular": 5}
 
     def files(folder: str, number: int | None = None) -> list[Path]:
         return select_files(models / folder, 1 if quick else number)
 
-    return [
-        KitCase("C-shells", files("conformals", 3), beams, stages),
-        KitCase("grids", files("grids"), beams, stages),
-        KitCase("umbrella meshes", files("umbrellas"), {"cell": 8}, stages),
+    shells = files("small") if quick else files("conformals", 3)
+    asked = [
+        ("C-shells", shells, beams),
+        ("grids", files("grids"), beams),
+        ("umbrella meshes", files("umbrellas"), {"cell": 8}),
     ]
+    # one study compares with the published method, others look at the same runs
+    return [KitCase(*case, stages, published=True, verdict=verdict) for case in asked]
 
 
 def data_sets(models: Path, released: Path, quick: bool = False) -> list[KitCase]:
@@ -144,4 +160,5 @@ def kit_of(case: KitCase, folder: Path, jobs: int) -> KitResult:
         inputs=files,
         resume=same,
         overwrite=True,
+        verdict=case.verdict,
     )

@@ -31,6 +31,8 @@ QUICK = StageSettings(
     leaps=0,
     path_steps=2,
     restarts=5,
+    effort="quick",
+    levelling=0,
 )
 
 

@@ -7,11 +7,20 @@ import pytest
 
 from kop_exudyn.io.datasets import load_designs
 from kop_exudyn.kit.parts import Assignment, Kit
-from kop_exudyn.search.stages import StageSettings
+from kop_exudyn.search.requirements import Requirements
+from kop_exudyn.search.settings import StageSettings
 from lib.kit_search import find_kit
 
 STAGES = StageSettings(
-    schedule=(1e4, 1e6), relaxed_steps=6, round_steps=6, reassignments=1, path_steps=3, restarts=5
+    schedule=(1e4, 1e6),
+    relaxed_steps=6,
+    round_steps=6,
+    reassignments=1,
+    path_steps=3,
+    restarts=5,
+    effort="quick",
+    levelling=0,
+    requirements=Requirements(samples=2),
 )
 
 

@@ -4,14 +4,10 @@ kits of the first."""
 from __future__ import annotations
 
 import csv
-import json
-import runpy
-import sys
-from pathlib import Path
 
 import pytest
+from support.quick_studies import data_of, run
 
-STUDIES = Path(__file__).resolve().parents[2] / "studies"
 FIGURES = {
     "kit_size_tradeoff": ["tradeoff"],
     "part_reuse": ["sharing", "subsets", "sizes", "front"],
@@ -20,26 +16,12 @@ FIGURES = {
 }
 
 
-def run(name: str, reports: Path, *arguments: str) -> Path:
-    """Run a study as its command does; the folder of its report."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            sys, "argv", [name, "--quick", "--jobs", "1", "--out", str(reports / name), *arguments]
-        )
-        runpy.run_path(str(STUDIES / f"{name}.py"), run_name="__main__")
-    return reports / name
-
-
 @pytest.fixture(scope="module")
 def reports(tmp_path_factory):
     folder = tmp_path_factory.mktemp("reports")
     for name in FIGURES:
         run(name, folder)
     return folder
-
-
-def data_of(reports: Path, name: str) -> dict:
-    return json.loads((reports / name / "data.json").read_text())
 
 
 @pytest.mark.parametrize("name", FIGURES)
@@ -95,8 +77,11 @@ def test_pieces_are_counted_under_both_weights(reports):
 
 
 def test_a_new_design_is_built_better_after_relaxation(reports):
-    for row in data_of(reports, "project_new_design")["weights"]:
-        assert row["reassigned J"] <= row["built J"] < row["direct J"]
+    """Or as well, where relaxation leaves every element nearest to the same part."""
+    rows = data_of(reports, "project_new_design")["weights"]
+    for row in rows:
+        assert row["reassigned J"] <= row["built J"] <= row["direct J"] * (1 + 1e-9)
+    assert min(row["reassigned J"] for row in rows) < rows[0]["direct J"]
 
 
 def test_slits_help_and_more_parts_need_shorter_ones(reports):
