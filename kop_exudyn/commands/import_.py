@@ -24,8 +24,8 @@ DESCRIPTION = """Writes a design file from
 
   a drawing (.obj: its polylines and splines; .dxf: lines, polylines, arcs, circles, ellipses, splines, blocks): a
   C-shell, its curves hinged wherever they cross; or, with --as grid, a grid of lamellas over its curves on a surface,
-  drawn in plan, or on the net's own surface where it is drawn in space. Drawings of C-shells lie in a plane. Pieces that go on in each
-  other become one curve; ends that meet and are of the two different families are hinged.
+  drawn in plan, or on the net's own surface where it is drawn in space. Drawings of C-shells lie in a plane. Pieces
+  that go on in each other become one curve; ends that meet and are of the two different families are hinged.
 
   a surface (with --patch; a mesh: .obj, .ply, .stl, or .json of COMPAS): an umbrella mesh in the shape of its middle,
   in millimetres, the arms as long as the cells have to grow.
