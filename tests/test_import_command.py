@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 
 from kop_exudyn.cli import main
 from kop_exudyn.io.designs import load_design
@@ -43,6 +45,23 @@ def test_formats_that_a_class_registers_are_imported(tmp_path, capsys, repositor
     finally:
         FORMATS.items.clear()
         FORMATS.items.update(there)
+
+
+def test_a_damaged_drawing_is_told_in_one_line(repository):
+    """Not in those of the library that reads it besides."""
+    file = repository / "tests" / "corpus" / "files" / "commas_in_numbers.dxf"
+    command = [sys.executable, "-m", "kop_exudyn", "import", str(file), "--preview", "no.html"]
+    ended = subprocess.run(command, capture_output=True, text=True, cwd=repository)
+    assert ended.returncode == 2
+    assert len(ended.stderr.splitlines()) == 1 and "damaged DXF file" in ended.stderr
+
+
+def test_rhino_files_without_its_library(repository, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rhino3dm", None)
+    file = repository / "tests" / "corpus" / "files" / "lines.3dm"
+    assert main(["import", str(file), "--preview", "no.html"]) == 2
+    told = capsys.readouterr().err
+    assert "pip install 'kop_exudyn[rhino]'" in told and "lines.3dm" in told
 
 
 def test_an_existing_file_is_kept(tmp_path, capsys):

@@ -22,10 +22,11 @@ if TYPE_CHECKING:
 HELP = "turn a drawing, a surface or a released umbrella mesh into a design file"
 DESCRIPTION = """Writes a design file from
 
-  a drawing (.obj: its polylines and splines; .dxf: lines, polylines, arcs, circles, ellipses, splines, blocks): a
-  C-shell, its curves hinged wherever they cross; or, with --as grid, a grid of lamellas over its curves on a surface,
-  drawn in plan, or on the net's own surface where it is drawn in space. Drawings of C-shells lie in a plane. Pieces
-  that go on in each other become one curve; ends that meet and are of the two different families are hinged.
+  a drawing (.obj: its polylines and splines; .dxf: lines, polylines, arcs, circles, ellipses, splines, blocks; .3dm:
+  curves, blocks): a C-shell, its curves hinged wherever they cross; or, with --as grid, a grid of lamellas over its
+  curves on a surface, drawn in plan, or on the net's own surface where it is drawn in space. Drawings of C-shells lie
+  in a plane. Pieces that go on in each other become one curve; ends that meet and are of the two different families
+  are hinged.
 
   a surface (with --patch; a mesh: .obj, .ply, .stl, or .json of COMPAS): an umbrella mesh in the shape of its middle,
   in millimetres, the arms as long as the cells have to grow.
@@ -60,7 +61,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "file",
         type=Path,
         metavar="FILE",
-        help="drawing (.obj, .dxf), surface (.obj, .ply, .stl, "
+        help="drawing (.obj, .dxf, .3dm), surface (.obj, .ply, .stl, "
         ".json) or released umbrella mesh (.json, .json.gz)",
     )
     parser.add_argument("--out", type=Path, metavar="DESIGN", help="design file to write (.json)")
@@ -74,7 +75,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--as",
         dest="kind",
         choices=_CLASSES,
-        help="class of the design (default: c_shell of .obj and .dxf, umbrella of others)",
+        help="class of the design (default: c_shell of drawings, umbrella of others)",
     )
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
     shell = parser.add_argument_group(
@@ -153,7 +154,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="of DXF files, the layer to read, hidden or not; may be given several times "
+        help="of DXF and 3dm files, the layer to read, hidden or not; may be given several times "
         "(default: all that can be seen)",
     )
     shell.add_argument(

@@ -1,5 +1,5 @@
-"""Curves from drawings: the polylines and splines of an OBJ file; what a DXF file draws, see
-`dxf_curves`."""
+"""Curves from drawings: the polylines and splines of an OBJ file; what DXF and Rhino files draw,
+see `dxf_curves` and `rhino_curves`."""
 
 from __future__ import annotations
 
@@ -14,9 +14,11 @@ from ..geometry.nurbs import spline_points
 from ..geometry.obj_files import ObjContent, parse_obj
 from .drawing import SAG, Drawing, DrawnCurve
 from .dxf_curves import dxf_drawing
+from .rhino_curves import rhino_drawing
 
 _SIZE_LIMIT = 64 * 2**20  # bytes: nets have some thousand points
 _MOST_CURVES = 20_000
+_WITH_LAYERS = (".dxf", ".3dm")
 
 
 def is_drawing(path: Path) -> bool:
@@ -25,9 +27,10 @@ def is_drawing(path: Path) -> bool:
 
 
 def read_drawing(path: str | Path, layers: Sequence[str] = ()) -> Drawing:
-    """All curves of an OBJ or DXF file, told apart by the name's ending.
+    """All curves of an OBJ, DXF or 3dm file, told apart by the name's ending.
 
-    layers : of DXF files, those to read, hidden ones included; default: all that can be seen
+    layers : of DXF and 3dm files, those to read, hidden ones included; default: all that can be
+        seen
 
     Raises InputError when the file can't be read, is too large, or has no curves.
     """
@@ -35,8 +38,10 @@ def read_drawing(path: str | Path, layers: Sequence[str] = ()) -> Drawing:
     suffix = path.suffix.lower()
     if suffix not in CURVE_READERS:
         raise InputError(f"is no file of curves (known: {', '.join(CURVE_READERS)})", source=path)
-    if layers and suffix != ".dxf":
-        raise InputError("only DXF files have layers", source=path, field="layer", value=layers[0])
+    if layers and suffix not in _WITH_LAYERS:
+        raise InputError(
+            "only DXF and 3dm files have layers", source=path, field="layer", value=layers[0]
+        )
     content = read_bytes(path, _SIZE_LIMIT)
     try:
         drawing = CURVE_READERS[suffix](content, layers)
@@ -92,4 +97,5 @@ def _free_forms(found: ObjContent) -> Iterator[DrawnCurve]:
 CURVE_READERS: dict[str, Callable[[bytes, Sequence[str]], Drawing]] = {
     ".obj": _obj_drawing,
     ".dxf": dxf_drawing,
+    ".3dm": rhino_drawing,
 }

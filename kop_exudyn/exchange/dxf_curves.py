@@ -18,8 +18,9 @@ import numpy as np
 
 from ..errors import InputError
 from ..fabrication.dxf import load_ezdxf
-from .drawing import SAG, Drawing, DrawnCurve
-from .dxf_outlines import Outline, outline_of, place_of
+from .drawing import Drawing
+from .dxf_outlines import outline_of
+from .outlines import flattened
 
 _DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE", "SPLINE", "ARC", "CIRCLE", "ELLIPSE")
 _BINARY = b"AutoCAD Binary DXF"
@@ -100,17 +101,15 @@ def dxf_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
         if wanted and e.layer.lower() not in wanted:
             continue
         if e.layer.lower() in hidden or e.invisible and not wanted:
-            unseen[e.layer] += 1
+            what = "on the hidden layer" if e.layer.lower() in hidden else "hidden on the layer"
+            unseen[f"{what} {e.layer} (--layer {e.layer} reads them)"] += 1
         elif e.entity.dxftype() == "INSERT":
             elsewhere[e.entity.dxf.name] += 1
         elif e.entity.dxftype() not in _DRAWN or _is_mesh(e.entity):
             others[e.entity.dxftype() + (" mesh" if _is_mesh(e.entity) else "")] += 1
         else:
             drawn.append((outline_of(e.entity, e.label, e.matrix), e.label))
-    skipped = [
-        f"{n} on the hidden layer {layer} (--layer {layer} reads them)"
-        for layer, n in unseen.items()
-    ]
+    skipped = [f"{n} {what}" for what, n in unseen.items()]
     skipped += [
         f"{n} insertions of {name}, a block of another file: bind it to this one, or import that "
         "file"
@@ -128,7 +127,7 @@ def dxf_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
     if name is None and code != 0:
         doubts.append(f"its unit of length has the number {code}, which isn't known: give --scale")
     outlines = [(outline, label) for outline, label in drawn if outline is not None]
-    return Drawing(list(_flattened(outlines)), name, metres, skipped, doubts)
+    return Drawing(list(flattened(outlines)), name, metres, skipped, doubts)
 
 
 def _document(ezdxf: Any, content: bytes) -> tuple[Any, list[str]]:
@@ -222,18 +221,3 @@ def _elsewhere(insert: Any) -> bool:
 
 def _is_mesh(entity: Any) -> bool:
     return entity.dxftype() == "POLYLINE" and (entity.is_polygon_mesh or entity.is_poly_face_mesh)
-
-
-def _flattened(outlines: Sequence[tuple[Outline, str]]) -> Iterator[DrawnCurve]:
-    """Points on the outlines, dense enough for the size of all of them."""
-    if not outlines:
-        return
-    corners = np.concatenate([outline.corners for outline, _ in outlines])
-    sag = SAG * float(np.linalg.norm(np.ptp(corners, axis=0)))
-    for outline, label in outlines:
-        points = outline.points(sag)
-        closed = outline.closed and len(points) > 3
-        kind, _, within = label.partition(" ")
-        block = f" {within.partition(' ')[2]}" if " " in within else ""
-        name = f"{kind}{block} from {place_of(points[0])}"
-        yield DrawnCurve(points[: len(points) - closed], closed, name)

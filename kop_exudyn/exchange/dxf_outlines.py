@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -11,19 +10,10 @@ import numpy as np
 from ..errors import InputError
 from ..files.documents import LARGEST
 from ..geometry.nurbs import spline_points
+from .outlines import Outline, place_of
 
 _FRAME_VERTEX = 16  # flag of a polyline's vertex: of the polygon that controls a spline
 _FIT_PIECES = 8  # between two fit points
-
-
-@dataclass(frozen=True)
-class Outline:
-    """What an entity draws: corners (n, 3) of lines and Bezier curves, or control points, which
-    tell its size; and points on it within a sag."""
-
-    corners: np.ndarray
-    points: Callable[[float], np.ndarray]
-    closed: bool = False
 
 
 def outline_of(entity: Any, label: str, matrix: Any = None) -> Outline | None:
@@ -109,7 +99,3 @@ def _begin(entity: Any) -> str:
         if place is not None:
             return f" at {place_of(place)}"
     return ""
-
-
-def place_of(point: Iterable[float]) -> str:
-    return f"({', '.join(f'{value:.6g}' for value in point)})"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -60,9 +61,12 @@ def _without_dates(options: Any) -> Iterator[None]:
 
 
 def load_ezdxf() -> Any:
-    """The library, with all of it that is used here; it takes a while to load."""
+    """The library, with all of it that is used here; it takes a while to load. What it finds wrong
+    with files is told once, by whoever reads them, not on standard error besides."""
     import ezdxf
     import ezdxf.enums
     import ezdxf.units
 
+    if not (log := logging.getLogger("ezdxf")).handlers:
+        log.addHandler(logging.NullHandler())
     return ezdxf

@@ -3,6 +3,7 @@
 import insertions  # noqa: F401
 import misdrawn  # noqa: F401
 import obj_styles  # noqa: F401
+import rhino_files  # noqa: F401
 import splines  # noqa: F401
 from drawings import CASES, Net, Refused
 

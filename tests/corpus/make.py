@@ -17,7 +17,7 @@ import meshes  # noqa: E402
 
 
 def write(folder: Path) -> list[Path]:
-    """Write all files; returns their paths."""
+    """Write all files; returns their paths. Needs rhino3dm."""
     folder.mkdir(exist_ok=True)
     done = []
     for cases in (drawings.CASES, meshes.CASES):

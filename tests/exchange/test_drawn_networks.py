@@ -104,8 +104,8 @@ class TestObj:
             read_drawing(path)
         assert str(caught.value).startswith(str(path))
 
-    def test_layers_are_of_dxf_files(self, obj):
-        with pytest.raises(InputError, match="only DXF files have layers"):
+    def test_layers_are_of_files_that_have_some(self, obj):
+        with pytest.raises(InputError, match="only DXF and 3dm files have layers"):
             read_drawing(obj, ["0"])
 
 
