@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import InputError
 
+_FARTHEST = 1e75  # coordinates of corners: the squares of areas don't overflow
 WELD = 1e-6  # of the size: vertices this near to each other are one
 _MOST_CUTS = 1000  # faces beside empty ones; of more, the empty ones are only left out
 _EMPTY = 1e-9  # of the longest side: a face lower than that has no area
@@ -28,6 +29,8 @@ def cleaned(
 
     vertices (v, 3), faces (f, 3) : as read
     tolerance : of the size, within which vertices are welded
+
+    Raises InputError for corners that aren't there or have no place.
     """
     notes = []
     wrong = (faces < 0) | (faces >= len(vertices))
@@ -38,6 +41,14 @@ def cleaned(
             value=int(faces[wrong][0]),
         )
     used = np.unique(faces)
+    far = ~(np.abs(vertices[used]) < _FARTHEST).all(axis=1)
+    if far.any():
+        raise InputError(
+            f"corner {used[far][0]} is no place: its coordinates must be numbers below "
+            f"{_FARTHEST:g}",
+            field="vertices",
+            value=vertices[used[far][0]].tolist(),
+        )
     size = float(np.linalg.norm(np.ptp(vertices[used], axis=0))) if len(used) else 0.0
     places, faces = welded(vertices, faces, tolerance * size)
     if len(places) < len(used):

@@ -62,7 +62,13 @@ def read_mesh(
     if not np.isfinite(vertices).all():
         raise InputError("contains no faces between finite vertices", field=field, value=path.name)
     _check_count(len(faces))
-    vertices, faces, found = cleaned(vertices, faces, tolerance)
+    try:
+        vertices, faces, found = cleaned(vertices, faces, tolerance)
+    except InputError as error:
+        at = "" if error.value is None else f" = {error.value}"
+        raise InputError(
+            f"{error.field}{at}: {error.message}", field=field, value=path.name
+        ) from None
     if not len(faces):
         raise InputError("contains no faces with an area", field=field, value=path.name)
     for note in found:

@@ -31,9 +31,9 @@ def compared_plates(file: Path, runs: int) -> dict[str, Any]:
     design = _umbrella(file)
     rows, joints, energies = [], {}, {}
     for model in PLATE_MODELS:
-        own = design.with_plates(model)
         times: list[float] = []
         for _ in range(runs):
+            own = design.with_plates(model)  # anew: a mesh keeps its input's deployment
             own.systems
             begin = process_time()
             equilibrium = own.deploy()["deployed"]

@@ -156,3 +156,21 @@ class TestLimits:
         monkeypatch.setattr(mesh_files, "_SIZE_LIMIT", 300)
         with pytest.raises(InputError, match="is larger than"):
             read_mesh(path)
+
+
+@pytest.mark.parametrize("far", [1e76, -1e300, np.inf, np.nan])
+def test_corners_that_are_nowhere_are_refused_by_name(far):
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, far, 0], [0, 0, far]])
+    faces = np.array([[0, 1, 2], [1, 3, 2]])
+    with pytest.raises(InputError, match="corner 3 is no place") as caught:
+        cleaned(corners, faces)
+    assert caught.value.field == "vertices"
+    places, kept, _ = cleaned(corners, faces[:1])  # who isn't used may be anywhere
+    assert len(places) == 3 and len(kept) == 1
+
+
+def test_the_file_of_a_corner_without_place_is_named(tmp_path):
+    path = tmp_path / "far.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1e300 0\nf 1 2 3\nf 2 4 3\n")
+    with pytest.raises(InputError, match=r"'far.obj': vertices = \[1.0, 1e\+300, 0.0\]: corner 3"):
+        read_mesh(path)
