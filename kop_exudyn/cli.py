@@ -9,6 +9,7 @@ import os
 import re
 import sys
 from collections.abc import Sequence
+from difflib import get_close_matches
 from importlib import import_module
 from keyword import iskeyword
 from pathlib import Path
@@ -20,6 +21,7 @@ from .commands.colour import RED, LogFormatter, coloured
 from .errors import InputError, OccupiedError, SimulationFailure, did_you_mean
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+_ALIKE = 0.75  # of two names, from where on one may be meant by the other
 
 _DESCRIPTION = (
     "Kits of parts for bending-active structures: one small set of pieces that builds many designs."
@@ -91,6 +93,18 @@ def _as_typed(error: InputError, options: set[str]) -> str:
     return f"--{option[2:]}{text[len(head) :]}" if option in options else text
 
 
+def _nearby(path: Path) -> str:
+    """What the folder of a path that isn't there has instead, if anything looks like it."""
+    try:
+        names = sorted(os.listdir(path.parent))
+    except OSError:
+        return ""
+    # endings are alike for all: names in front of them are compared
+    stems = {name.split(".")[0].lower(): name for name in reversed(names)}
+    near = get_close_matches(path.name.split(".")[0].lower(), list(stems), 1, _ALIKE)
+    return f" (did you mean {str(path.parent / stems[near[0]])!r}?)" if near else ""
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run ``kop`` with these arguments (default: those of the process); returns the exit status."""
     args, unknown = make_parser().parse_known_args(argv)
@@ -100,7 +114,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         for path in args.command.inputs(args):
             if not os.path.exists(path):
-                raise InputError(f"no such {'file' if path.suffix else 'folder'}", source=path)
+                kind = "file" if path.suffix else "folder"
+                raise InputError(f"no such {kind}{_nearby(path)}", source=path)
         status = args.run(args)
         sys.stdout.flush()  # here, where a reader that has gone can be dealt with
         return status

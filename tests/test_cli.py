@@ -261,6 +261,15 @@ class TestSimulate:
         assert status_of("simulate", tmp_path / "no.json") == 2
         assert capsys.readouterr().err == f"kop: {tmp_path / 'no.json'}: no such file\n"
 
+    @pytest.mark.parametrize("typed", ["01_sinh", "01_sihn.json", "01_Sinh.jsn"])
+    def test_a_file_that_is_nearly_there_is_named(self, typed, tmp_path, capsys):
+        """Without its ending, with letters swapped, with another ending."""
+        (tmp_path / "01_sinh.json").write_text("{}")
+        (tmp_path / "03_exp.json").write_text("{}")
+        assert status_of("simulate", tmp_path / typed) == 2
+        meant = tmp_path / "01_sinh.json"
+        assert capsys.readouterr().err.endswith(f"(did you mean {str(meant)!r}?)\n")
+
     def test_interruption(self, design_file, simulated, capsys):
         simulated["error"] = KeyboardInterrupt()
         assert status_of("simulate", design_file) == 130

@@ -281,7 +281,10 @@ def _check_request(elements: Mapping[str, KindElements], parts: Mapping[str, int
         part_kind(name)
         if name not in elements:
             raise InputError(
-                "the designs have no elements of this kind", field=f"parts.{name}", value=count
+                "the designs have no elements of this kind "
+                f"(theirs are {', '.join(sorted(elements))})",
+                field=f"parts.{name}",
+                value=count,
             )
         if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
             raise InputError(
