@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import InputError
 
-_FARTHEST = 1e75  # coordinates of corners: the squares of areas don't overflow
+_FARTHEST = 1e60  # coordinates of corners: the squares of areas don't overflow
 WELD = 1e-6  # of the size: vertices this near to each other are one
 _MOST_CUTS = 1000  # faces beside empty ones; of more, the empty ones are only left out
 _EMPTY = 1e-9  # of the longest side: a face lower than that has no area
