@@ -14,8 +14,7 @@ from ..errors import SimulationFailure
 from .events import ASSIGNED, SQPLabel
 from .objective import DesignDerivatives, Evaluation
 from .reassign import LocalModel, MoveParts, Reassignment, best_parts, keep_parts, reassign
-from .settings import StageSettings
-from .stage_results import StageResult, all_same, combined
+from .stage_results import StageResult, combined
 from .stages import Stages
 
 log = logging.getLogger(__name__)
@@ -33,12 +32,9 @@ _FAR_OFF = 2.0  # times J
 _REPEATS = 4  # reassignments before an SQP
 _BOLD = 0.01  # of the elements get other parts in a leap, at least
 _BOLD_DAMPINGS = (*_DAMPINGS, 1e-6, 1e-7, 0.0)
-_AFTER_LEAP = 2  # rounds at most
+AFTER_LEAP = 2  # rounds at most
 # of J: another reassignment comes before the SQP while they lower it by this factor
 _WORTHWHILE = 0.97
-
-# times the weights of stress and energy, where a design snaps
-_CALMER = (3.0, 10.0, 30.0)
 
 # what came of a reassignment, and the damping of its model
 _Trial = tuple[StageResult, Reassignment, float]
@@ -49,6 +45,7 @@ def assigned_stage(
     start: StageResult,
     numbers: Iterator[int] | None = None,
     leaps: int | None = None,
+    seen: list[StageResult] | None = None,
 ) -> StageResult:
     """Reassign and optimise in turns until neither gains, from a state in which every element is
     its part; then leap.
@@ -59,18 +56,21 @@ def assigned_stage(
 
     numbers : of the rounds, where this isn't the first call: every SQP has a name of its own
     leaps : default: the settings'
+    seen : gets the results on the way: where the best one has to be given up, one of them may do
     """
     settings = stages.settings
     if settings.reassignments == 0:
         label = ASSIGNED if numbers is None else SQPLabel.of_round(next(numbers))
-        return stages.assigned(start, label) if stages.optimises else start
-    rounds = _Rounds(stages, numbers or count(1), start.steps)
+        if not stages.optimises:
+            return start
+        return stages.best_confirmed(stages.assigned(start, label), start)
+    rounds = _Rounds(stages, numbers or count(1), start.steps, [] if seen is None else seen)
     best = rounds.alternated(start, settings.reassignments)
     leaps = settings.leaps if leaps is None else leaps
     while leaps > 0 and best.value is not None:
         for trial in _bold_trials(stages, best)[:leaps]:
             leaps -= 1
-            landed = rounds.alternated(rounds.landed(trial), _AFTER_LEAP)
+            landed = rounds.alternated(rounds.landed(trial), AFTER_LEAP)
             log.info("a leap ends at J = %.5g, from %.5g", _value(landed), _value(best))
             if _value(landed) < _value(best):
                 leaps = leaps if rounds.worthwhile(best, landed) else 0
@@ -78,133 +78,19 @@ def assigned_stage(
                 break
         else:
             break
-    return replace(rounds.polished(best), steps=rounds.steps, jumps=start.jumps)
-
-
-def opened_stage(
-    stages: Stages,
-    start: StageResult,
-    before: StageResult | None = None,
-    numbers: Iterator[int] | None = None,
-) -> StageResult:
-    """Designs that open into their shape by themselves, and keep to it whatever errors of the
-    workshop do: rounds from where they open into, again and again.
-
-    The states of the assigned stage are led to from the relaxed ones, by ways that no builder goes:
-    the search is freer so. Opened from its assembly, a design may end in another stable state; with
-    rounds from there (but no leaps, which end in other states more often), the optimisation works
-    on the states that a builder will find. Where they still aren't the same in the end, the best of
-    these states are kept, and the parts optimised once more in secured steps. Then follows
-    `forgiving_stage`.
-
-    before : where the assigned stage began
-    numbers : of the rounds, where this isn't the first call: every SQP has a name of its own
-
-    The result's states are those that the designs open into, unless one doesn't open at all.
-    """
-    settings = stages.settings
-    result, numbers = start, numbers or count(_rounds_at_most(settings))
-    if not stages.required.opening:
-        return forgiving_stage(stages, start, (), numbers, before)
-    found: list[StageResult] = []
-    for number in range(settings.redeployments + 1):
-        opened = stages.judged(replace(result, designs=stages.redeployed(result)))
-        log.info("opened from the assembly: J = %.5g, from %.5g", _value(opened), _value(result))
-        same = opened.value is not None and all_same(stages.dataset.designs, result, opened)
-        if opened.value is not None:
-            found.append(result if same else opened)
-        if number == settings.redeployments or opened.value is None or same:
-            break
-        result = assigned_stage(stages, stages.confirmed(opened), numbers, leaps=0)
-    if not found:
-        return start
-    best = min(found, key=_value)
-    others = [other for other in found if other is not best]
-    if best is not result:
-        best = _secured(stages, best, numbers, forgiving=not stages.snapping(best))
-    return replace(forgiving_stage(stages, best, others, numbers, before), jumps=start.jumps)
-
-
-def forgiving_stage(
-    stages: Stages,
-    best: StageResult,
-    others: Sequence[StageResult],
-    numbers: Iterator[int],
-    before: StageResult | None = None,
-) -> StageResult:
-    """A result whose designs keep to their shape whatever errors of the workshop do; `best` where
-    they do, or where nothing else is found.
-
-    others : results that were found on the way to the best one
-    numbers : of the SQPs that follow
-    before : where the assigned stage began, which is gone back to where nothing else helps
-
-    A design that snaps is a point that should not have been accepted. The first of the others that
-    forgives is the next best point. The parts are also optimised with more weight on stress and
-    energy, and from there again with the weights asked for, in steps that keep to what was won.
-    """
-    lost = stages.snapping(best)
-    if not lost:
-        return best
-    names = [stages.dataset.designs[n].name for n in lost]
-    log.info("errors of the workshop make %s snap", ", ".join(names))
-    found: list[StageResult] = []
-    for other in sorted(others, key=_value):
-        if not stages.snapping(other):
-            found.append(_secured(stages, other, numbers, forgiving=True))
-            break
-    steps = best.steps
-    for factor in _CALMER if stages.optimises else ():
-        calmer = stages.calmer(factor)
-        trial = calmer.assigned(calmer.weighed(best), SQPLabel.of_round(next(numbers)))
-        steps += trial.steps
-        if stages.required.opening:
-            opened = stages.judged(replace(trial, designs=stages.redeployed(trial)))
-        else:
-            opened = stages.weighed(trial)
-        if opened.value is not None and not stages.snapping(opened):
-            found.append(_secured(stages, opened, numbers, forgiving=True))
-            break
-    if not found and before is not None:
-        first = stages.secured().kept(before)
-        if first.value is not None and not stages.snapping(first):
-            found.append(_secured(stages, first, numbers, forgiving=True))
-    if not found:
-        return replace(best, steps=steps, snapping=lost)
-    won = min(found, key=_value)
-    log.info("they keep to their shapes at J = %.5g, from %.5g", _value(won), _value(best))
-    return replace(won, steps=max(steps, won.steps))
-
-
-def _secured(
-    stages: Stages, best: StageResult, numbers: Iterator[int], forgiving: bool
-) -> StageResult:
-    """Designs in the states that they open into, with the parts optimised once more in steps that
-    keep every design on the branch along which it opens, and forgiving if it is that; as they were
-    where that gains nothing."""
-    secured = stages.secured(forgiving=forgiving)
-    best = secured.kept(best)
-    if not stages.optimises or best.value is None:
-        return best
-    found = secured.assigned(best, SQPLabel.of_round(next(numbers)))
-    opened = replace(found, designs=secured.redeployed(found))
-    same = found.value is not None and all_same(secured.dataset.designs, found, opened)
-    return replace(found, steps=best.steps + found.steps) if same else best
-
-
-def _rounds_at_most(settings: StageSettings) -> int:
-    """How many rounds the assigned stage may have had before its designs are opened."""
-    return 2 + settings.reassignments + settings.leaps * (1 + _AFTER_LEAP)
+    end = stages.best_confirmed(rounds.polished(best), best, start)
+    return replace(end, steps=rounds.steps, jumps=start.jumps)
 
 
 @dataclass
 class _Rounds:
-    """Rounds with numbers, and the steps of their SQPs (those of rounds that are undone
-    included)."""
+    """Rounds with numbers, the steps of their SQPs (those of rounds that are undone included), and
+    their results."""
 
     stages: Stages
     numbers: Iterator[int]
     steps: int
+    seen: list[StageResult]
 
     def alternated(self, best: StageResult, rounds: int) -> StageResult:
         """Reassigned and optimised in so many rounds at most, as long as they gain."""
@@ -212,7 +98,9 @@ class _Rounds:
             result = _many_reassigned(self.stages, best)
             if result is best and (number > 0 or not self.stages.optimises):
                 break
+            self.seen.append(result)
             result = self._optimised(result)
+            self.seen.append(result)
             last, best = best, min((best, result), key=_value)
             if not self.worthwhile(last, best):
                 break
@@ -275,10 +163,12 @@ def _best_trial(stages: Stages, best: StageResult) -> StageResult | None:
     if stages.rule.parts_move:
         trials += _together(stages, best, derivatives)
     found = [trial for trial in trials if trial is not None]
-    if not found or _value(trial := min(found, key=_value)) >= _PATIENCE * _value(best):
-        return None
-    trial = stages.kept(trial)
-    return trial if trial.value is not None else None
+    for trial in sorted(found, key=_value):
+        if _value(trial) >= _PATIENCE * _value(best):
+            break
+        if (kept := stages.kept(trial)).value is not None:
+            return kept
+    return None
 
 
 def _each_its_own(
@@ -373,7 +263,9 @@ def _trial(
         return None
     # nobody looks for snaps here, and J tells what came of them
     path_steps = (stages.settings.path_steps + 1) // 2
-    trial = stages.built_from(found.kit, found.assignment, best.evaluations, found.free, path_steps)
+    trial = stages.built_from(
+        found.kit, found.assignment, best.evaluations, found.free, path_steps, watched=False
+    )
     log.info(
         "other parts for %d elements (damping %g%s): J = %.5g, predicted %.5g",
         found.changes,

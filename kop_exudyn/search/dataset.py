@@ -214,12 +214,17 @@ class Dataset:
         return all_or_raise(list(self._map(DesignObjective.derivatives, calls).values()))
 
     def follow(
-        self, q: np.ndarray, previous: Sequence[Evaluation], steps: int
+        self, q: np.ndarray, previous: Sequence[Evaluation], steps: int, watched: bool = True
     ) -> list[list[Evaluation] | SimulationFailure]:
         """Straight paths of all designs to q; a design that fails on its way comes back as its
-        failure."""
+        failure.
+
+        watched : in all these steps; else in as few of them as lead there, see
+            `DesignObjective.approach`
+        """
         calls = {n: (part, previous[n], steps) for n, part in enumerate(self.split(q))}
-        results = list(self._map(DesignObjective.follow, calls).values())
+        method = DesignObjective.follow if watched else DesignObjective.approach
+        results = list(self._map(method, calls).values())
         for path in results:
             for evaluation in path if isinstance(path, list) else ():
                 self.tally.add(evaluation)

@@ -93,11 +93,11 @@ def _built(
             continue
         seen.add(key)
         number += 1
-        built = stages.built_from(kit, neighbour.assignment, best.evaluations, free)
+        built = stages.built_from(kit, neighbour.assignment, best.evaluations, free, watched=False)
         if built.value is not None and built.merit <= _HOPELESS * best.merit:
-            confirmed = stages.kept(built)
-            if confirmed.value is not None:
-                yield confirmed
+            kept = stages.kept(built)
+            if kept.value is not None:
+                yield kept
         if number == trials:
             return
 

@@ -23,7 +23,7 @@ from ..equilibrium.newton import NewtonOptions, refine, solve
 from ..equilibrium.sensitivities import Sensitivities
 from ..errors import InputError, SimulationFailure
 from ..structures.base import Design
-from ..structures.fitting import FitResult, TargetFitting
+from ..structures.fitting import FitResult, TargetFitting, best_placement
 from ..structures.load_bound import LoadBound
 from ..structures.opening import SAME_STATE
 from ..structures.stress_bound import NEAR, Rows, StressBound
@@ -34,6 +34,9 @@ log = logging.getLogger(__name__)
 
 # A trial point that takes longer than this is better met by a shorter step.
 _TRIAL = NewtonOptions(max_iterations=80)
+# Joints' movement that one step is enough for, as a share of the size. Measured on three C-shells:
+# below 0.7 % one step ends where five do, to five digits of J, in a fifth of the time.
+_REACH = 0.01
 
 
 @dataclass(frozen=True)
@@ -412,6 +415,27 @@ class DesignObjective:
             except SimulationFailure as failure:
                 raise failure.within(f"at {t:.0%} of the way to the parts") from None
         return path
+
+    def approach(self, q: np.ndarray, previous: Evaluation, steps: int) -> list[Evaluation]:
+        """As `follow`, in no more steps than the way asks for: as many as keep the joints'
+        predicted movement in each below 1 % of the size; in all of them where that fails."""
+        fewer = min(steps, max(1, int(np.ceil(self._moved(q, previous) / _REACH))))
+        try:
+            return self.follow(q, previous, fewer)
+        except SimulationFailure:
+            if fewer == steps:
+                raise
+            return self.follow(q, previous, steps)
+
+    def _moved(self, q: np.ndarray, previous: Evaluation) -> float:
+        """How far the joint that moves most is predicted to move on the way to q, at its best
+        placement, as a share of the size."""
+        design, role = self.design, self.design.fitted_role.name
+        near = previous.equilibria[role]
+        there = Sensitivities(design.systems[role], near).predict(q - near.q)
+        x, y = (start.state.positions[design.joints] for start in (there, near))
+        placed = best_placement(x, y, np.full(len(x), 1 / len(x))).apply(x)
+        return float(np.linalg.norm(placed - y, axis=1).max()) / previous.fit.size
 
     def _solve(
         self,

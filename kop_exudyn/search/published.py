@@ -71,7 +71,7 @@ def published_method(
     announce("published method: relaxed stage")
     relaxed, built = stages.to_parts(stages.relaxed(kit))
     announce("published method: assigned stage")
-    led = stages.assigned(built)
+    led = stages.confirmed(stages.assigned(built))
     seconds = perf_counter() - begin
     led = replace(led, steps=relaxed.steps + led.steps)
     opened = stages.confirmed(replace(led, designs=stages.redeployed(led), jumps=[]))

@@ -27,13 +27,13 @@ from ..structures.stacking import (
     stacked_parameters,
 )
 from ..units import common_units, unnamed_units
-from .assigned import opened_stage
 from .checkpoints import NoStore, Store
 from .dataset import Dataset
 from .events import UNRELAXED, Observer, StageEvent
 from .levelling import level
 from .neighbours import resized
 from .objective import Evaluation, Weights
+from .opening import opened_stage
 from .pool import DesignPool
 from .published import published_method
 from .requirements import Requirements
@@ -145,7 +145,13 @@ def optimize_kit(
             bases = [stages.inputs(), found["relaxed"].evaluations]
         starts = assigned_from_starts(stages, result.at_parts, bases)
         announce("deployment of the assigned designs")
-        opened = opened_stage(stages, starts.best, result.at_parts)
+        opened = opened_stage(
+            stages,
+            starts.best,
+            result.at_parts,
+            last_resorts=False,
+            seen=[each for seen in starts.seen.values() for each in seen],
+        )
         forgiving = forgiving_from_starts(stages, starts, opened, result.at_parts)
         found["assigned"] = level(stages, forgiving)
         result.tried = starts.tried

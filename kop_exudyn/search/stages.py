@@ -119,7 +119,7 @@ class Stages:
         tolerance: float | None = None,
     ) -> StageResult:
         """Minimise over the parts from a state in which every element is its part; designs that
-        failed stay out.
+        failed stay out. Not confirmed yet: that is for what the rounds leave.
 
         label : of the SQP; one of its own for every call
         max_steps, tolerance : default: the settings' `assigned_steps` and `assigned_tolerance`
@@ -154,7 +154,7 @@ class Stages:
         found = self._result(
             designs, result.point.data.kit, start.assignment, result.steps, result.status
         )
-        return self.confirmed(replace(found, pressure=_pressure(result)))
+        return replace(found, pressure=_pressure(result))
 
     def assigned_problem(self, start: StageResult, members: Sequence[int]) -> AssignedProblem:
         """The problem over the parts, for some of the designs."""
@@ -182,14 +182,16 @@ class Stages:
         start: Sequence[Evaluation],
         free: np.ndarray | None = None,
         path_steps: int | None = None,
+        watched: bool = True,
     ) -> StageResult:
         """All designs followed from evaluations to the parts of another kit or assignment; not
         confirmed yet.
 
         free : (k,) new values of the parameters of no element; default: they stay
         path_steps : default: the settings'
+        watched : for snaps, in all these steps; else in as few of them as lead there
         """
-        designs, jumps = self._to_parts(start, kit, assignment, free, path_steps)
+        designs, jumps = self._to_parts(start, kit, assignment, free, path_steps, watched)
         return self._result(designs, kit, assignment, jumps=jumps)
 
     def judged(self, result: StageResult) -> StageResult:
@@ -229,9 +231,18 @@ class Stages:
         return self.judged(replace(result, designs=designs))
 
     def kept(self, result: StageResult) -> StageResult:
-        """A result that the search goes on from: confirmed, and opened where the stages are
-        secured."""
-        return self.confirmed(self.opened(result) if self.dataset.requirements.opening else result)
+        """A result that the search goes on from: opened where the stages are secured."""
+        return self.opened(result) if self.dataset.requirements.opening else result
+
+    def best_confirmed(self, *results: StageResult) -> StageResult:
+        """The first of these results whose designs Exudyn confirms; the first one, with its
+        failures, where there is none."""
+        found = [self.confirmed(results[0])]
+        for result in results[1:]:
+            if found[-1].value is not None:
+                break
+            found.append(self.confirmed(result))
+        return found[-1] if found[-1].value is not None else found[0]
 
     def secured(self, forgiving: bool = False) -> Stages:
         """The same stages with designs kept on the branch along which they open: reassigned ones
@@ -278,7 +289,12 @@ class Stages:
     def snapping(self, result: StageResult) -> tuple[int, ...]:
         """The designs of a result that errors of the workshop make snap, where it is required that
         they don't."""
-        found = {n: d for n, d in enumerate(result.designs) if isinstance(d, Evaluation)}
+        return self.snapping_among(result, range(len(result.designs)))
+
+    def snapping_among(self, result: StageResult, members: Sequence[int]) -> tuple[int, ...]:
+        """As `snapping`, of some of the designs."""
+        designs = {n: result.designs[n] for n in members}
+        found = {n: d for n, d in designs.items() if isinstance(d, Evaluation)}
         return tuple(self.dataset.requiring(self.required).snapping(found))
 
     def redeployed(self, result: StageResult) -> list[Evaluation | SimulationFailure]:
@@ -432,13 +448,15 @@ class Stages:
         assignment: Assignment,
         free: np.ndarray | None = None,
         path_steps: int | None = None,
+        watched: bool = True,
     ) -> tuple[list[Evaluation | SimulationFailure], list[Jump]]:
         """Follow all designs to their parts; one that fails on the way is deployed there from
         scratch instead."""
         if free is None:
             free = np.concatenate([e.q for e in start])[self.dataset.free]
         q = self._realised(kit, assignment, free)
-        outcomes = self.dataset.follow(q, start, path_steps or self.settings.path_steps)
+        steps = path_steps or self.settings.path_steps
+        outcomes = self.dataset.follow(q, start, steps, watched)
         designs: list[Evaluation | SimulationFailure] = []
         jumps = []
         for n, path in enumerate(outcomes):

@@ -10,29 +10,30 @@ again (iterated local search: Lourenço, Martin and Stützle 2003), and the best
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 
 import numpy as np
 
 from ..kit.cluster import cluster
-from ..kit.kinds import part_kind
 from ..kit.parts import Assignment, Kit
-from .assigned import assigned_stage, opened_stage
+from .assigned import assigned_stage
 from .events import SQPLabel
 from .exchange import exchanged
+from .forgiving import DEAR, forgiving_stage, secured_steps, substitute
 from .objective import Evaluation
+from .opening import opened_stage
 from .problems import AssignedProblem
 from .reassign import LocalModel, Reassignment, improved
 from .settings import EFFORTS, Effort
+from .shaking import shaken
 from .stage_results import StageResult
 from .stages import Stages
 
 log = logging.getLogger(__name__)
 
 _DAMPINGS = (1e-3, 1e-5)  # of the models
-_SHAKEN = 0.05  # of the elements get any other part, at least two
 # times the lowest J built: starts above that aren't optimised. Measured on three C-shells (12 + 5
 # parts): one that began at 1.9 times J of the relaxed designs' parts ended 17 % below these.
 _PROMISING = 3.0
@@ -63,6 +64,7 @@ class Starts:
 
     best : result; tried : what was tried, in the order of the starts
     others : results from other starts, in the order of J
+    seen : by number in `tried`, results on the way of starts that were optimised
     left : numbers in `tried` of starts that weren't optimised, and these, in the order of J
     first : number of the next SQP that has no name yet
     """
@@ -70,6 +72,7 @@ class Starts:
     best: StageResult
     tried: list[TriedStart]
     others: list[tuple[int, StageResult]]
+    seen: dict[int, list[StageResult]]
     left: list[tuple[int, StageResult]]
     first: int
 
@@ -97,10 +100,11 @@ def assigned_from_starts(
     order = sorted(promising, key=lambda n: starts[n][1].merit)[: effort.optimised]
     best, which = built, 0
     ends: list[tuple[int, StageResult]] = []
+    seen: dict[int, list[StageResult]] = {}
     for k, n in enumerate(order):
         start = starts[n][1] if starts[n][0] == "relaxed" else stages.confirmed(starts[n][1])
         numbers = None if k == 0 else count(1 + _NUMBERS * k)
-        end = assigned_stage(stages, start, numbers)
+        end = assigned_stage(stages, start, numbers, seen=seen.setdefault(n, []))
         tried[n] = replace(tried[n], optimised=end.value)
         log.info(
             "start %d (%s) ends at J = %s, from %s", k + 1, starts[n][0], end.value, start.value
@@ -129,6 +133,7 @@ def assigned_from_starts(
             ((n, end) for n, end in ends if n != which and end.value is not None),
             key=lambda pair: pair[1].merit,
         ),
+        seen,
         [(n, starts[n][1]) for n in left if starts[n][1].value is not None],
         1 + _NUMBERS * (len(order) + 1),
     )
@@ -138,31 +143,82 @@ def forgiving_from_starts(
     stages: Stages, found: Starts, result: StageResult, before: StageResult | None
 ) -> StageResult:
     """A result whose designs keep to their shape whatever errors of the workshop do, from other
-    starts than the best one where that ended in designs that snap; `result` where none helps.
+    starts than the best one where that ended in designs that snap, or in a far higher J so as to
+    keep them from it; `result` where none is better.
 
     Whether a kit forgives can't be told from J: kits of nearly the same J differ in it. So the ends
-    of the other starts are looked at, and then starts that weren't optimised, a few at most.
+    of the other starts are looked at, and then starts that weren't optimised, a few at most. Where
+    a design opens into quite another state, the way back from there is long: results on the way to
+    that end are looked at instead, and the way back is gone only where nothing else forgives. In
+    the end, `forgiving_stage` has its last resorts.
+
+    result : of the best start, without these
     """
+    dear = DEAR * found.best.merit
+    if not result.snapping and result.merit <= dear or not stages.rule.parts_move:
+        return result if not result.snapping else _resorted(stages, result, found.first, before)
     tried, first = found.tried, found.first
-    candidates = [*found.others, *found.left][:_SPARE]
     optimised = {n for n, _ in found.others}
-    for n, start in candidates if stages.rule.parts_move else ():
-        if not result.snapping:
-            break
-        log.info("designs snap: trying start %d (%s) as well", n + 1, tried[n].origin)
-        numbers, first = count(first), first + _NUMBERS
-        end = start
+    kept = next(n for n, one in enumerate(tried) if one.kept)
+    winners = [] if result.snapping else [(kept, result)]
+    put_off: list[tuple[float, int, StageResult, Iterator[int]]] = []
+
+    def opened_from(n: int, end: StageResult, numbers: Iterator[int]) -> None:
+        opened = opened_stage(stages, end, before, numbers, False, found.seen.get(n, ()))
+        if opened.value is not None and not opened.snapping:
+            winners.append((n, opened))
+
+    for n, start in [*found.others, *found.left[:1]] if winners else _candidates(found):
+        log.info("trying start %d (%s) as well", n + 1, tried[n].origin)
+        numbers, first, end = count(first), first + _NUMBERS, start
         if n not in optimised:
-            end = assigned_stage(stages, stages.confirmed(start), numbers)
+            seen = found.seen.setdefault(n, [])
+            end = assigned_stage(stages, stages.confirmed(start), numbers, seen=seen)
             tried[n] = replace(tried[n], optimised=end.value)
         if end.value is None:
             continue
-        opened = opened_stage(stages, end, before, numbers)
-        if opened.value is not None and not opened.snapping:
-            tried[:] = [replace(one, kept=k == n) for k, one in enumerate(tried)]
-            log.info("that one forgives, at J = %.5g, from %s", opened.value, result.value)
-            return replace(opened, steps=result.steps + opened.steps, jumps=result.jumps)
-    return result
+        there = _opens_at(stages, end)
+        if there <= _PROMISING * end.merit:
+            opened_from(n, end, numbers)
+        else:
+            put_off.append((there, n, end, numbers))
+            if n not in optimised:  # those of the others were looked at before
+                other = substitute(stages, found.best, found.seen[n])
+                if other is not None:
+                    winners.append((n, secured_steps(stages, other, numbers, forgiving=True)))
+        if any(won.merit <= dear for _, won in winners):
+            break
+    for _, n, end, own in sorted(put_off, key=lambda one: one[0]):
+        if not winners:
+            opened_from(n, end, own)
+    if not winners:
+        return _resorted(stages, result, first, before)
+    which, won = min(winners, key=lambda pair: pair[1].merit)
+    if won is result:
+        return result
+    tried[:] = [replace(one, kept=k == which) for k, one in enumerate(tried)]
+    log.info("start %d forgives, at J = %s, from %s", which + 1, won.value, result.value)
+    return replace(won, steps=result.steps + won.steps, jumps=result.jumps)
+
+
+def _candidates(found: Starts) -> list[tuple[int, StageResult]]:
+    """Other starts that may forgive: those that were optimised first."""
+    return [*found.others, *found.left][:_SPARE]
+
+
+def _resorted(
+    stages: Stages, result: StageResult, first: int, before: StageResult | None
+) -> StageResult:
+    """What the last resorts make of a result with designs that snap."""
+    resorted = forgiving_stage(stages, result, (), count(first), before)
+    return replace(resorted, jumps=result.jumps)
+
+
+def _opens_at(stages: Stages, end: StageResult) -> float:
+    """J of the states that designs open into by themselves."""
+    if not stages.required.opening:
+        return end.merit
+    return stages.judged(replace(end, designs=stages.redeployed(end))).merit
 
 
 def model_starts(
@@ -220,8 +276,8 @@ def _best_under(stages: Stages, model: LocalModel, options: Effort) -> list[Reas
         for _ in range(options.shakes):
             if best is None:
                 break
-            shaken = _shaken(best.assignment, best.kit, rng)
-            trial = _improved(stages, model, best.kit, shaken)
+            start = shaken(best.assignment, best.kit, rng)
+            trial = _improved(stages, model, best.kit, start)
             if trial is not None and trial.total < best.total:
                 best = trial
         ends += [best] if best is not None else []
@@ -246,22 +302,3 @@ def _improved(
         costs=stages.costs,
     )
     return improved(problem, model)
-
-
-def _shaken(assignment: Assignment, kit: Kit, rng: np.random.Generator) -> Assignment:
-    """Some elements with any other part, in any variant."""
-    n = sum(len(part) for part in assignment.part)
-    wanted = max(2, round(_SHAKEN * n))
-    parts, variants = (
-        [a.copy() for a in arrays] for arrays in (assignment.part, assignment.variant)
-    )
-    sizes = np.array([len(part) for part in parts])
-    ends = np.cumsum(sizes)
-    for element in rng.choice(n, size=min(wanted, n), replace=False):
-        number = int(np.searchsorted(ends, element, side="right"))
-        k = int(element - (ends[number] - sizes[number]))
-        group = assignment.groups[number]
-        ways = part_kind(group.kind).variants_of(group.indices.shape[1])
-        parts[number][k] = rng.integers(len(kit[group.kind]))
-        variants[number][k] = rng.integers(len(ways.names))
-    return Assignment(assignment.groups, tuple(parts), tuple(variants), assignment.n_q)

@@ -12,9 +12,10 @@ from kop_exudyn.kit.reuse import PieceCount
 from kop_exudyn.kit.stock import Stock
 from kop_exudyn.search import assigned as rounds
 from kop_exudyn.search import reassign as reassigning
-from kop_exudyn.search.assigned import assigned_stage, opened_stage
+from kop_exudyn.search.assigned import assigned_stage
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.objective import Weights
+from kop_exudyn.search.opening import opened_stage
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.problems import AssignedProblem
 from kop_exudyn.search.reassign import LocalModel, keep_parts, reassign

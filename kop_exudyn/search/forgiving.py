@@ -1,0 +1,182 @@
+"""Kits whose designs keep to their shape whatever errors of the workshop do.
+
+A design that snaps when its elements are a little off has other stable states near the one that is
+wanted. Kits of nearly the same J differ in that, and nothing in J tells it: what helps is another
+kit that is about as good, or another way to make the design of the same one.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .events import SQPLabel
+from .reassign import LocalModel, improved, keep_parts
+from .shaking import shaken
+from .stage_results import StageResult, all_same, combined
+from .stages import Stages
+
+log = logging.getLogger(__name__)
+
+# times the weights of stress and energy, where a design snaps
+_CALMER = (3.0, 10.0, 30.0)
+_NEAR = 1.5  # times J: results above that are no substitute
+DEAR = 1.1  # times J: where what was found is above that, the last resorts are tried as well
+_LOOKED_AT = 12  # results on the way, at most
+_WAYS = 12  # to make a design, that are tried at most
+_SHAKEN = 0.01  # of its elements
+_DAMPING = 1e-2  # of the model that these follow
+
+
+def forgiving_stage(
+    stages: Stages,
+    best: StageResult,
+    others: Sequence[StageResult],
+    numbers: Iterator[int],
+    before: StageResult | None = None,
+    last_resorts: bool = True,
+) -> StageResult:
+    """A result whose designs keep to their shape whatever errors of the workshop do; `best` where
+    they do, or where nothing else is found.
+
+    others : results that were found on the way to the best one; those are looked at that aren't
+        far above it
+    numbers : of the SQPs that follow
+    before : where the assigned stage began, which is gone back to where nothing else helps
+    last_resorts : whether more is tried than the others
+
+    A design that snaps is a point that should not have been accepted. The first of the others that
+    forgives is the next best point; where there is none, the designs that snap are made of the same
+    parts otherwise (see `made_otherwise`). As a last resort the parts are also optimised with more
+    weight on stress and energy, and from there again with the weights asked for, in steps that
+    keep to what was won.
+    """
+    lost = stages.snapping(best)
+    if not lost:
+        return best
+    names = [stages.dataset.designs[n].name for n in lost]
+    log.info("errors of the workshop make %s snap", ", ".join(names))
+    found: list[StageResult] = []
+    if (other := substitute(stages, best, others)) is not None:
+        found.append(secured_steps(stages, other, numbers, forgiving=True))
+    mended, still = best, lost
+    if not found:
+        mended, still = made_otherwise(stages, best, lost)
+        if not still:
+            found.append(secured_steps(stages, mended, numbers, forgiving=True))
+    steps = best.steps
+
+    def more_to_try() -> bool:
+        dear = DEAR * value_of(best)
+        return last_resorts and all(value_of(one) > dear for one in found)
+
+    for factor in _CALMER if stages.optimises and more_to_try() else ():
+        calmer = stages.calmer(factor)
+        trial = calmer.assigned(calmer.weighed(best), SQPLabel.of_round(next(numbers)))
+        steps += trial.steps
+        if stages.required.opening:
+            opened = stages.judged(replace(trial, designs=stages.redeployed(trial)))
+        else:
+            opened = stages.weighed(trial)
+        if opened.value is not None and not stages.snapping(opened):
+            found.append(secured_steps(stages, opened, numbers, forgiving=True))
+            break
+    if before is not None and more_to_try():
+        first = stages.secured().kept(before)
+        if first.value is not None and not stages.snapping(first):
+            found.append(secured_steps(stages, first, numbers, forgiving=True))
+    if not found:
+        return replace(mended, steps=steps, snapping=still)
+    won = min(found, key=value_of)
+    log.info("they keep to their shapes at J = %.5g, from %.5g", value_of(won), value_of(best))
+    return replace(won, steps=max(steps, won.steps))
+
+
+def substitute(
+    stages: Stages, best: StageResult, others: Sequence[StageResult]
+) -> StageResult | None:
+    """The best of other results that opens into about as good states and forgives; None without
+    one."""
+    limit = _NEAR * value_of(best)
+    near = sorted((other for other in others if value_of(other) <= limit), key=value_of)
+    for number, other in enumerate(near[:_LOOKED_AT]):
+        opened = stages.secured().kept(other)
+        if value_of(opened) > limit or stages.snapping(opened):
+            continue
+        log.info("the result on the way number %d forgives, at J = %.5g", number, value_of(opened))
+        return opened
+    return None
+
+
+def made_otherwise(
+    stages: Stages, result: StageResult, lost: Sequence[int]
+) -> tuple[StageResult, tuple[int, ...]]:
+    """The result with other parts, of the same kit, for the elements of designs that snap; and the
+    designs that still do.
+
+    With the parts as they are, designs don't depend on each other. A share of a design's elements
+    get any other parts, and then all those that the model prefers: another local minimum, of which
+    there are many. Each is opened and tried with errors.
+
+    lost : the designs that snap
+    """
+    still = tuple(lost)
+    if stages.rule.stock is not None or len(stages.dataset.sliding):
+        return result, still
+    dataset, limit = stages.dataset, _NEAR * value_of(result)
+    derivatives = dataset.derivatives(result.evaluations, hessian=True)
+    scales = dataset.split(dataset.scales())
+    model = LocalModel.of(derivatives, dataset.design_weights, scales, _DAMPING)
+    for n in lost:
+        rng = np.random.default_rng([stages.settings.seed, n])
+        own = [g for g, design in enumerate(dataset.group_designs) if design == n]
+        others = [k for k in range(len(result.designs)) if k != n]
+        ways = []
+        for _ in range(_WAYS):
+            problem = stages.assigned_problem(result, range(len(result.designs)))
+            start = shaken(result.assignment, result.kit, rng, own, _SHAKEN)
+            found = improved(problem.reassigned(start), model, others, keep_parts)
+            if found is not None and found.assignment.changes(result.assignment):
+                ways.append(found)
+        for way in sorted(ways, key=lambda way: way.total):
+            steps = (stages.settings.path_steps + 1) // 2
+            trial = stages.built_from(
+                way.kit, way.assignment, result.evaluations, way.free, steps, watched=False
+            )
+            chosen = [trial if k == n else result for k in range(len(result.designs))]
+            opened = stages.secured().kept(stages.judged(combined(chosen, dataset)))
+            if value_of(opened) <= limit and n not in stages.snapping_among(opened, [n]):
+                log.info(
+                    "%s made of other parts forgives: J = %.5g, from %.5g",
+                    dataset.designs[n].name,
+                    value_of(opened),
+                    value_of(result),
+                )
+                result = replace(opened, steps=result.steps, status=result.status)
+                still = tuple(k for k in still if k != n)
+                break
+    return result, still
+
+
+def secured_steps(
+    stages: Stages, best: StageResult, numbers: Iterator[int], forgiving: bool
+) -> StageResult:
+    """Designs in the states that they open into, with the parts optimised once more in steps that
+    keep every design on the branch along which it opens, and forgiving if it is that; as they were
+    where that gains nothing."""
+    secured = stages.secured(forgiving=forgiving)
+    best = stages.secured().kept(best)
+    if not stages.optimises or best.value is None:
+        return best
+    found = secured.assigned(best, SQPLabel.of_round(next(numbers)))
+    opened = replace(found, designs=secured.redeployed(found))
+    same = found.value is not None and all_same(secured.dataset.designs, found, opened)
+    return replace(found, steps=best.steps + found.steps) if same else best
+
+
+def value_of(result: StageResult) -> float:
+    """What results are compared by."""
+    return result.merit
