@@ -149,8 +149,8 @@ def forgiving_from_starts(
     Whether a kit forgives can't be told from J: kits of nearly the same J differ in it. So the ends
     of the other starts are looked at, and then starts that weren't optimised, a few at most. Where
     a design opens into quite another state, the way back from there is long: results on the way to
-    that end are looked at instead, and the way back is gone only where nothing else forgives. In
-    the end, `forgiving_stage` has its last resorts.
+    that end are looked at first, and the way back is gone where these cost much, or nothing else
+    forgives. In the end, `forgiving_stage` has its last resorts.
 
     result : of the best start, without these
     """
@@ -188,9 +188,10 @@ def forgiving_from_starts(
                     winners.append((n, secured_steps(stages, other, numbers, forgiving=True)))
         if any(won.merit <= dear for _, won in winners):
             break
-    for _, n, end, own in sorted(put_off, key=lambda one: one[0]):
-        if not winners:
-            opened_from(n, end, own)
+    for k, (_, n, end, own) in enumerate(sorted(put_off, key=lambda one: one[0])):
+        if any(won.merit <= dear for _, won in winners) or (winners and k > 0):
+            break
+        opened_from(n, end, own)
     if not winners:
         return _resorted(stages, result, first, before)
     which, won = min(winners, key=lambda pair: pair[1].merit)

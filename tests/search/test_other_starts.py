@@ -1,0 +1,131 @@
+"""Other starts where the best one ends in designs that snap: which are tried, in which order."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from kop_exudyn.search import starts
+from kop_exudyn.search.stage_results import StageResult
+from kop_exudyn.search.starts import Starts, TriedStart, forgiving_from_starts
+
+
+def result(value, snapping=()):
+    return StageResult([], None, None, value=value, snapping=snapping)
+
+
+@pytest.fixture
+def search(monkeypatch):
+    """Stages of which no design is solved: each start has an end, where that opens, what forgives
+    on the way to it, and what comes of rounds from where it opens. Calls are noted."""
+    calls = []
+    outcomes = {}
+
+    def of(start):
+        return next(outcome for outcome in outcomes.values() if outcome["start"] is start)
+
+    def optimised(stages, start, numbers, seen):
+        calls.append(("optimised", start.value))
+        seen.append(start)
+        return of(start)["end"]
+
+    def opened(stages, end, before, numbers, last_resorts, seen):
+        assert not last_resorts
+        calls.append(("rounds", end.value))
+        return next(one["rounds"] for one in outcomes.values() if one["end"] is end)
+
+    def substitute(stages, best, seen):
+        calls.append(("on the way", seen[0].value))
+        return of(seen[0])["on the way"]
+
+    def resorts(stages, given, others, numbers, before):
+        calls.append(("resorts", given.value))
+        return result(7.0)
+
+    monkeypatch.setattr(starts, "assigned_stage", optimised)
+    monkeypatch.setattr(starts, "opened_stage", opened)
+    monkeypatch.setattr(starts, "substitute", substitute)
+    monkeypatch.setattr(starts, "secured_steps", lambda stages, other, numbers, forgiving: other)
+    monkeypatch.setattr(starts, "forgiving_stage", resorts)
+    monkeypatch.setattr(
+        starts,
+        "_opens_at",
+        lambda stages, end: next(o["opens"] for o in outcomes.values() if o["end"] is end),
+    )
+    stages = SimpleNamespace(rule=SimpleNamespace(parts_move=True), confirmed=lambda one: one)
+    return stages, outcomes, calls
+
+
+def found(outcomes, given):
+    """What the first stage left: the best start, of J 1, and others that aren't optimised."""
+    for k, (value, opens, on_the_way, rounds) in given.items():
+        outcomes[k] = {
+            "start": result(10.0 + k),
+            "end": result(value),
+            "opens": opens,
+            "on the way": on_the_way,
+            "rounds": rounds,
+        }
+    tried = [TriedStart("relaxed", 5.0, 1.0, kept=True)]
+    tried += [TriedStart("model", 10.0 + k) for k in given]
+    left = [(k, outcomes[k]["start"]) for k in given]
+    return Starts(result(1.0), tried, [], {}, left, 101)
+
+
+def test_nothing_is_tried_where_the_best_forgives(search):
+    stages, outcomes, calls = search
+    given = found(outcomes, {1: (1.0, 1.0, None, result(1.0))})
+    best = result(1.05)
+    assert forgiving_from_starts(stages, given, best, None) is best and not calls
+
+
+def test_the_first_start_that_forgives_is_the_last(search):
+    stages, outcomes, calls = search
+    given = found(
+        outcomes,
+        {
+            1: (1.0, 1.1, None, result(1.1, (0,))),
+            2: (1.0, 1.0, None, result(1.02)),
+            3: (1.0, 1.0, None, result(1.0)),
+        },
+    )
+    won = forgiving_from_starts(stages, given, result(1.0, (0,)), None)
+    assert won.value == 1.02 and [one.kept for one in given.tried] == [False, False, True, False]
+    assert calls == [("optimised", 11.0), ("rounds", 1.0), ("optimised", 12.0), ("rounds", 1.0)]
+
+
+def test_long_ways_back_are_put_off(search):
+    """Rounds from another state come after all starts, the nearest first."""
+    stages, outcomes, calls = search
+    given = found(
+        outcomes,
+        {
+            1: (1.0, 9.0, None, result(1.05)),
+            2: (1.1, 5.0, None, result(1.2)),
+            3: (1.2, 1.2, None, result(1.2, (1,))),
+        },
+    )
+    won = forgiving_from_starts(stages, given, result(1.0, (0,)), None)
+    assert won.value == 1.2 and given.tried[2].kept
+    assert [call for call in calls if call[0] == "rounds"] == [("rounds", 1.2), ("rounds", 1.1)]
+
+
+def test_a_dear_result_is_bettered_by_one_more_start(search):
+    stages, outcomes, calls = search
+    given = found(
+        outcomes, {1: (1.0, 9.0, result(1.3), result(1.15)), 2: (1.0, 1.0, None, result(1.0))}
+    )
+    won = forgiving_from_starts(stages, given, result(1.4), None)
+    assert won.value == 1.15 and given.tried[1].kept
+    assert calls == [("optimised", 11.0), ("on the way", 11.0), ("rounds", 1.0)]
+    dear = result(1.12)
+    calls.clear()
+    given = found(outcomes, {1: (1.0, 9.0, result(1.3), result(1.4, (0,)))})
+    assert forgiving_from_starts(stages, given, dear, None) is dear
+    assert given.tried[0].kept
+
+
+def test_where_no_start_forgives_there_are_last_resorts(search):
+    stages, outcomes, calls = search
+    given = found(outcomes, {1: (1.0, 1.0, None, result(1.0, (0,)))})
+    assert forgiving_from_starts(stages, given, result(1.0, (0,)), None).value == 7.0
+    assert calls[-1] == ("resorts", 1.0)
