@@ -29,7 +29,7 @@ def test_short_ways_take_one_step_and_long_ones_all(objective):
 
 def test_it_ends_where_all_steps_do(objective):
     start, way = start_and_way(objective)
-    q = start.q + 1e-3 * way
+    q = start.q + 1e-4 * way
     few, all_ = (found(q, start, 5) for found in (objective.approach, objective.follow))
     assert len(few) < len(all_) == 5
     assert few[-1].value == pytest.approx(all_[-1].value, rel=1e-6)
