@@ -49,10 +49,9 @@ def forgiving_stage(
     last_resorts : whether more is tried than the others
 
     A design that snaps is a point that should not have been accepted. The first of the others that
-    forgives is the next best point; where there is none, the designs that snap are made of the same
-    parts otherwise (see `made_otherwise`). As a last resort the parts are also optimised with more
-    weight on stress and energy, and from there again with the weights asked for, in steps that
-    keep to what was won.
+    forgives is the next best point. Last resorts: the designs that snap are made of the same parts
+    otherwise (see `made_otherwise`); the parts are optimised with more weight on stress and energy,
+    and from there again with the weights asked for, in steps that keep to what was won.
     """
     lost = stages.snapping(best)
     if not lost:
@@ -63,7 +62,7 @@ def forgiving_stage(
     if (other := substitute(stages, best, others)) is not None:
         found.append(secured_steps(stages, other, numbers, forgiving=True))
     mended, still = best, lost
-    if not found:
+    if not found and last_resorts:
         mended, still = made_otherwise(stages, best, lost)
         if not still:
             found.append(secured_steps(stages, mended, numbers, forgiving=True))

@@ -38,7 +38,7 @@ _DAMPINGS = (1e-3, 1e-5)  # of the models
 # parts): one that began at 1.9 times J of the relaxed designs' parts ended 17 % below these.
 _PROMISING = 3.0
 _NUMBERS = 100  # of rounds, at most, of each start: every SQP has a name of its own
-_SPARE = 3  # other starts, at most, that are tried where designs of the best one snap
+_SPARE = 2  # other starts, at most, that are tried where designs of the best one snap
 _SAME = 1e-6  # relative; starts whose predictions are that close are one
 
 

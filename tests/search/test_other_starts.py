@@ -93,20 +93,23 @@ def test_the_first_start_that_forgives_is_the_last(search):
     assert calls == [("optimised", 11.0), ("rounds", 1.0), ("optimised", 12.0), ("rounds", 1.0)]
 
 
-def test_long_ways_back_are_put_off(search):
+@pytest.mark.parametrize(
+    ("opens", "order", "won"),
+    [((9.0, 1.1), [1.1, 1.0], 1.05), ((9.0, 5.0), [1.1, 1.0], 1.05), ((4.0, 9.0), [1.0], 1.05)],
+)
+def test_long_ways_back_are_put_off(search, opens, order, won):
     """Rounds from another state come after all starts, the nearest first."""
     stages, outcomes, calls = search
     given = found(
         outcomes,
         {
-            1: (1.0, 9.0, None, result(1.05)),
-            2: (1.1, 5.0, None, result(1.2)),
-            3: (1.2, 1.2, None, result(1.2, (1,))),
+            1: (1.0, opens[0], None, result(1.05)),
+            2: (1.1, opens[1], None, result(1.2, (1,))),
         },
     )
-    won = forgiving_from_starts(stages, given, result(1.0, (0,)), None)
-    assert won.value == 1.2 and given.tried[2].kept
-    assert [call for call in calls if call[0] == "rounds"] == [("rounds", 1.2), ("rounds", 1.1)]
+    assert forgiving_from_starts(stages, given, result(1.0, (0,)), None).value == won
+    assert given.tried[1].kept
+    assert [value for what, value in calls if what == "rounds"] == order
 
 
 def test_a_dear_result_is_bettered_by_one_more_start(search):
