@@ -261,6 +261,14 @@ class TestSimulate:
         assert status_of("simulate", tmp_path / "no.json") == 2
         assert capsys.readouterr().err == f"kop: {tmp_path / 'no.json'}: no such file\n"
 
+    def test_several_files_are_to_be_a_folder(self, tmp_path, capsys):
+        files = [tmp_path / name for name in ("a.json", "b.json")]
+        for file in files:
+            file.write_text("{}")
+        out = tmp_path / "out"
+        assert status_of("optimize", *files, "--parts", "linear=3", "--out", out) == 2
+        assert "are one folder, or some of a folder by --designs" in capsys.readouterr().err
+
     @pytest.mark.parametrize("typed", ["01_sinh", "01_sihn.json", "01_Sinh.jsn"])
     def test_a_file_that_is_nearly_there_is_named(self, typed, tmp_path, capsys):
         """Without its ending, with letters swapped, with another ending."""

@@ -74,7 +74,7 @@ class SizedKit:
 
     @property
     def max_percent(self) -> float:
-        """The largest deviation of any design as it opens, % of its box; infinite where one can't
+        """The largest deviation of any design as it opens, % of its size; infinite where one can't
         be built."""
         return deviation(self.result)
 
@@ -110,7 +110,7 @@ Examine = Callable[[DesignPool], None]
 
 
 def deviation(result: KitResult) -> float:
-    """The largest deviation of any design, as kept and as it opens from its assembly, % of its box;
+    """The largest deviation of any design, as kept and as it opens from its assembly, % of its size;
     infinite where one can't be built."""
     found = [result.summary("assigned", n) for n in range(len(result.designs))]
     if result.redeployed:

@@ -121,7 +121,7 @@ def _text(checks: list[DesignCheck], parts: Mapping[str, int]) -> str:
             strength = f", stress {100 * max(used):.0f} % of the elastic limit" if used else ""
             lines.append(
                 f"  opens; deviation max {check.max_percent:.2g} %, mean "
-                f"{check.mean_percent:.2g} % of its box{strength}"
+                f"{check.mean_percent:.2g} % of its size{strength}"
             )
         lines.append(
             f"  {check.elements_percent:.0f} % of the elements, {check.energy_percent:.0f} % of "

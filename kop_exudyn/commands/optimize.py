@@ -79,7 +79,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         type=positive_number,
         metavar="PERCENT",
         help="find the smallest kit that keeps every design within this deviation from its target, "
-        "in %% of its box; the search begins with --parts (default: 8 of each kind)",
+        "in %% of its size; the search begins with --parts (default: 8 of each kind)",
     )
     add_cost(
         parser,

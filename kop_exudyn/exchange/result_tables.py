@@ -27,7 +27,7 @@ def result_tables(result: KitResult) -> dict[str, Rows]:
     angles in radians.
 
     designs : one row a design and stage, the input and where the assigned design opens into
-        included: its units, fit in % of the bounding box, energy, utilisation; or the failure
+        included: its units, fit in % of the size, energy, utilisation; or the failure
     elements : one row an element: its part and variant, and its parameters as in the input and in
         every stage
     joints : one row a design, stage and joint: place and distance from the target

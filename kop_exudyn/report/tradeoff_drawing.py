@@ -41,7 +41,7 @@ def draw_tradeoff(rows: Rows, kind: str, knee: int | None = None) -> Figure:
             zorder=0,
             label="the best with at most so many parts",
         )
-        fit.set(title="Fidelity", ylabel="deviation, % of bounding box", yscale="log")
+        fit.set(title="Fidelity", ylabel="deviation, % of the size", yscale="log")
         _line(pieces, sizes, [row["kit size %"] for row in rows], "o-", "blue")
         pieces.set(title="Kit size", ylabel="pieces, % of all elements", ylim=(0, None))
         _line(energy, sizes, [row["largest energy ratio"] for row in rows], "o-", "blue")

@@ -208,7 +208,7 @@ class KitResult:
 def summary_of(
     outcome: Evaluation | SimulationFailure, design: Design, reference: Reference
 ) -> dict[str, Any]:
-    """One design's figures: fit in % of the bounding box, energies, stability, Exudyn's
+    """One design's figures: fit in % of the size, energies, stability, Exudyn's
     confirmation, stresses."""
     if isinstance(outcome, SimulationFailure):
         return {"failed": str(outcome)}
