@@ -110,8 +110,8 @@ Examine = Callable[[DesignPool], None]
 
 
 def deviation(result: KitResult) -> float:
-    """The largest deviation of any design, as kept and as it opens from its assembly, % of its size;
-    infinite where one can't be built."""
+    """The largest deviation of any design, as kept and as it opens from its assembly, % of its
+    size; infinite where one can't be built."""
     found = [result.summary("assigned", n) for n in range(len(result.designs))]
     if result.redeployed:
         found += [result.redeployment(n) for n in range(len(result.designs))]
