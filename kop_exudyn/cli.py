@@ -4,6 +4,7 @@ status."""
 from __future__ import annotations
 
 import argparse
+import gc
 import logging
 import os
 import re
@@ -19,6 +20,10 @@ from . import __version__
 from .commands import NAMES
 from .commands.colour import RED, LogFormatter, coloured
 from .errors import InputError, OccupiedError, SimulationFailure, did_you_mean
+
+# Imports make many objects that stay. To look through them for garbage after every 700 new ones, as
+# Python does by itself, takes 6 % of the processor time of `kop simulate`.
+_NEW_OBJECTS = 50_000
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 _ALIKE = 0.75  # of two names, from where on one may be meant by the other
@@ -113,6 +118,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if unknown:
         args.command.refuse(unknown)
     _set_up_logging(args)
+    gc.set_threshold(_NEW_OBJECTS)
     try:
         for path in args.command.inputs(args):
             if not os.path.exists(path):

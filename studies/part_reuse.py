@@ -27,7 +27,7 @@ from kop_exudyn.io.datasets import select_files
 from lib.repeated import repeated_task
 from lib.reuse_drawing import draw_front, draw_reuse_over_size, draw_sharing, draw_subsets
 from lib.study import Study
-from lib.study_tasks import shared_kits
+from lib.study_tasks import QUICK, changed, shared_kits
 from lib.sweep import Task
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
@@ -169,7 +169,7 @@ def weighed(study: Study) -> list[dict[str, Any]]:
     else:
         files, parts = select_files(MODELS / "conformals", 5), {"linear": SHOWN, "angular": 5}
     jobs = 1 if study.scheduler else study.jobs  # workers of a cluster start no processes
-    stages = {"effort": "quick"} if study.quick else {}
+    stages = changed(QUICK) if study.quick else {}
     tasks = {
         weight: Task(
             f"reuse weight {weight:g}",

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from kop_exudyn.search.objective import Evaluation
+from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.result import KitResult
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
@@ -39,6 +40,14 @@ def find_kit(
     """
     settings = JobSettings(stages=stages, jobs=jobs, baselines=False)
     return _plain(optimize_kit(designs, parts, start=start, settings=settings))
+
+
+def stages_of(plain: Mapping[str, Any]) -> StageSettings:
+    """Settings from the plain data of a task: those that aren't the default ones."""
+    given = dict(plain)
+    if "requirements" in given:
+        given["requirements"] = Requirements(**given["requirements"])
+    return StageSettings(**given)
 
 
 def _plain(result: KitResult) -> dict[str, Any]:

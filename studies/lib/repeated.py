@@ -13,8 +13,10 @@ import numpy as np
 from kop_exudyn.analysis.sizes import deviation
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.search.run import optimize_kit
-from kop_exudyn.search.settings import JobSettings, StageSettings
+from kop_exudyn.search.settings import JobSettings
 from kop_exudyn.structures.base import Design
+
+from .kit_search import stages_of
 
 PERTURBATION = 1e-9  # relative, standard deviation
 
@@ -38,7 +40,7 @@ def repeated_task(
     kept and as opened in %, pieces to make, equilibria, wall time in s."""
     begin = perf_counter()
     designs = [perturbed(load_design(file), seed) for file in files]
-    settings = JobSettings(stages=StageSettings(**stages), jobs=jobs, baselines=False)
+    settings = JobSettings(stages=stages_of(stages), jobs=jobs, baselines=False)
     result = optimize_kit(designs, parts, settings=settings)
     largest = deviation(result)
     return {

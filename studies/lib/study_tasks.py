@@ -12,9 +12,10 @@ from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.io.datasets import select_files
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.kit.parts import Kit
+from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.settings import StageSettings
 
-from .kit_search import find_kit
+from .kit_search import find_kit, stages_of
 from .new_design import project_design
 from .slits import optimised_kit, slit_kit
 from .study import Study
@@ -33,6 +34,7 @@ QUICK = StageSettings(
     restarts=5,
     effort="quick",
     levelling=0,
+    requirements=Requirements(samples=0),
 )
 
 
@@ -77,9 +79,7 @@ def kit_task(
 ) -> dict[str, Any]:
     """See `find_kit`; it starts from the result of the task before, if there is one."""
     start = None if before is None else before["realised"]
-    return find_kit(
-        [load_design(file) for file in files], parts, StageSettings(**stages), start, jobs
-    )
+    return find_kit([load_design(file) for file in files], parts, stages_of(stages), start, jobs)
 
 
 def project_task(
@@ -90,7 +90,7 @@ def project_task(
     if before is None:
         raise SimulationFailure("there is no kit to project onto")
     return project_design(
-        load_design(file), Kit.from_dict(before["kit"]), factor, StageSettings(**stages)
+        load_design(file), Kit.from_dict(before["kit"]), factor, stages_of(stages)
     )
 
 
@@ -109,7 +109,7 @@ def slit_search_task(
 ) -> dict[str, Any]:
     """See `optimised_kit`."""
     designs = [load_design(file) for file in files]
-    return optimised_kit(designs, kind, parts, corners, StageSettings(**stages), jobs)
+    return optimised_kit(designs, kind, parts, corners, stages_of(stages), jobs)
 
 
 def changed(stages: StageSettings) -> dict[str, Any]:
