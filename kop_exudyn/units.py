@@ -161,7 +161,7 @@ def common_units(named: Mapping[str, Units | None], what: str = "designs") -> Un
         if other != units:
             raise InputError(
                 f"{what} that go together need the same units: {first} has {units}, {name} has "
-                f"{other}",
+                f"{other} (kop import --unit and --force-unit write a drawing's design in others)",
                 field="units",
             )
     return units
