@@ -1,6 +1,7 @@
-"""All drawings of the corpus: importing this module fills `drawings.CASES`."""
+"""All of the corpus: importing this module fills `drawings.CASES` and `meshes.CASES`."""
 
 import insertions  # noqa: F401
+import mesh_styles  # noqa: F401
 import misdrawn  # noqa: F401
 import obj_styles  # noqa: F401
 import rhino_files  # noqa: F401
