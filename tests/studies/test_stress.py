@@ -1,5 +1,5 @@
 """The stress study in its quick mode, in a process of its own: it runs the classical cases' tests
-itself."""
+itself, in this mode those of planar rods; all are in tests/stress."""
 
 import json
 import subprocess
@@ -16,7 +16,7 @@ def test_the_quick_mode_finds_nothing_wrong(tmp_path):
     assert done.returncode == 0, done.stderr
     data = json.loads((tmp_path / "data.json").read_text(encoding="utf-8"))
     assert (
-        len(data["classical"]) >= 30 and max(abs(row["error %"]) for row in data["classical"]) < 0.5
+        len(data["classical"]) >= 10 and max(abs(row["error %"]) for row in data["classical"]) < 0.5
     )
     assert set(data["random"]) | set(data["symmetric"]) <= {"stable", "failed"}
     assert data["fuzzing"]["files"] == 1000 and data["fuzzing"]["findings"] == []

@@ -59,7 +59,7 @@ def start(designs: Path, out: Path, jobs: int = 1, parts: str = "linear=2") -> s
     )
 
 
-def finish(process: subprocess.Popen, seconds: float = 300.0) -> None:
+def finish(process: subprocess.Popen, seconds: float = 3000.0) -> None:
     """Wait for success. Raises RuntimeError with what the process said otherwise."""
     _, said = process.communicate(timeout=seconds)
     if process.returncode:
@@ -69,7 +69,7 @@ def finish(process: subprocess.Popen, seconds: float = 300.0) -> None:
 
 
 def kill_after(
-    process: subprocess.Popen, out: Path, seconds: float, patience: float = 120.0
+    process: subprocess.Popen, out: Path, seconds: float, patience: float = 1200.0
 ) -> bool:
     """SIGKILL so long after the run has opened its folder; False when it was done before."""
     limit = monotonic() + patience
