@@ -297,6 +297,10 @@ def assembly_drawing(parts: PartsList, name: str, unit: str) -> AssemblyDrawing:
     placed = PlacedPieces.of(pieces, role)
     flat = any(has_joint(part_kind(piece.kind)) for piece in pieces.pieces)
     state = parts.states[number][role] if parts.states and flat else placed.scene.initial
+    if design.hardware is not None:  # a scene begins with what holds it where that is in the end
+        positions = state.positions.copy()
+        positions[design.joints] = design.hardware.joints
+        state = State(positions, state.rotations, state.angles)
     return flattened(parts, placed, state, scale)
 
 

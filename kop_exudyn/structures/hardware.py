@@ -41,6 +41,7 @@ class CellHardware:
     arm_position : from the middle of a plate's edge to the arm, counter-clockwise seen from outside
     corners (n_cells, 3, 2) : of every cell's plates in plan, before anything is opened, in the
         order of the design's elements
+    joints (n_joints, 3) : where the design's joints are then
     """
 
     arms: tuple[Arm, ...]
@@ -51,3 +52,4 @@ class CellHardware:
     width: float
     arm_position: float
     corners: np.ndarray
+    joints: np.ndarray

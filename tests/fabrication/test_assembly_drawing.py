@@ -12,6 +12,7 @@ from kop_exudyn.errors import InputError
 from kop_exudyn.fabrication.assembly_drawing import assembly_drawing, assembly_pages, draw_assembly
 from kop_exudyn.fabrication.paper import Book
 from kop_exudyn.fabrication.pieces import parts_list
+from kop_exudyn.io.designs import load_design
 from kop_exudyn.kit.cluster import cluster
 from kop_exudyn.structures.base import design_from_dict
 
@@ -170,3 +171,20 @@ def test_labels_that_find_no_place_are_counted():
 def test_unknown_design(shell, parts):
     with pytest.raises(InputError, match="no such design"):
         assembly_drawing(parts, "other", "m")
+
+
+@pytest.mark.parametrize("name", ["dome", "hill", "saddle"])
+def test_joints_of_cells_are_drawn_between_their_plates(name, repository):
+    """All of them before anything is opened: the joint that a mesh is held at was drawn where it
+    is in the end, beside the plan."""
+    design = load_design(repository / "models" / "umbrellas" / f"{name}.json")
+    found = cluster(design.groups, design.parameters, {"cell": 3})
+    parts = parts_list(found.kit, found.assignment, [design])
+    drawing = assembly_drawing(parts, name, "mm")
+    plates = shapely.union_all([shapely.Polygon(corners) for corners in drawing.cells])
+    edge = design.hardware.edge
+    away = shapely.distance(plates, shapely.points(drawing.joints))
+    assert len(away) == len(design.joints) and away.max() < 0.5 * edge
+    # a joint stands in the gap between two plates, or at a plate's free edge
+    assert np.linalg.norm(drawing.joints, axis=1).max() < 0.6 * np.hypot(*np.ptp(
+        drawing.cells.reshape(-1, 2), axis=0))  # fmt: skip

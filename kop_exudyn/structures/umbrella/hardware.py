@@ -37,6 +37,7 @@ def cell_hardware(mesh: UmbrellaMesh) -> CellHardware:
         mesh.width,
         _arm_position(mesh, numbers),
         _plate_corners(mesh, numbers),
+        mesh.positions[mesh.crossings],
     )
 
 
