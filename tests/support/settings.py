@@ -10,4 +10,5 @@ ONE_STEP = StageSettings(
     reassignments=0,
     path_steps=2,
     effort="quick",
+    levelling=0,
 )
