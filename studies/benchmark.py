@@ -159,7 +159,7 @@ def finding(goals_: list[dict]) -> str:
     )
     missed = [row["goal"] for row in goals_ if row["met"] != "yes"]
     return (
-        f"{len(goals_) - len(missed)} of {len(goals_)} goals of speed and memory are met; {told}. "
+        f"{len(goals_) - len(missed)} of {len(goals_)} goals are met; {told}. "
         f"{'Missed: ' + ', '.join(missed) + '.' if missed else 'None is missed.'}"
     )
 
