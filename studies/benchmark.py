@@ -153,15 +153,18 @@ def main() -> None:
 
 
 def finding(goals_: list[dict]) -> str:
-    """The largest figures first, then how many goals are met and which aren't."""
-    told = "; ".join(
-        f"{row['goal']}: {row['measured']:.3g} {row['unit']} ({row['asked']})" for row in goals_[:2]
-    )
-    missed = [row["goal"] for row in goals_ if row["met"] != "yes"]
-    return (
-        f"{len(goals_) - len(missed)} of {len(goals_)} goals are met; {told}. "
-        f"{'Missed: ' + ', '.join(missed) + '.' if missed else 'None is missed.'}"
-    )
+    """What misses its goal first, then the largest figures of the others."""
+
+    def told(rows: list[dict]) -> str:
+        return "; ".join(
+            f"{row['goal']}: {row['measured']:.3g} {row['unit']} ({row['asked']})" for row in rows
+        )
+
+    missed = [row for row in goals_ if row["met"] != "yes"]
+    kept = [row for row in goals_ if row["met"] == "yes"]
+    sentences = [f"Short of what was asked for: {told(missed)}." if missed else ""]
+    sentences += [f"{told(kept[:2])}." if kept else ""]
+    return " ".join(filter(None, sentences))
 
 
 def grid(n: int):
