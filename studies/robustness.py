@@ -71,6 +71,13 @@ def main() -> None:
         for factor in factors
     }
     at_edge = [f"{row['design']} ({row['snapped']})" for row in rows if row["snapped"]]
+    soft = [
+        f"{found['design']} (predicted {size['predicted_rms_percent']:.2g} %, sampled "
+        f"{size['sampled_rms_percent']:.2g} %)"
+        for found in every
+        for size in found["sizes"]
+        if size["factor"] == 1.0 and size.get("linear_error", 0.0) > 1.0
+    ]
     ends = f"At the tolerance {', '.join(at_edge)} snap" if at_edge else "None snaps"
     finding = (
         f"Errors of 0.1 % and 0.1° move the joints of {len(every)} designs by "
@@ -79,6 +86,12 @@ def main() -> None:
         f"{100 * np.median(missed[factors[0]]):.2g} % of the displacement at {factors[0]:g} times "
         f"the tolerance, {100 * np.median(missed[1.0]):.2g} % at the tolerance and "
         f"{100 * np.median(missed[factors[-1]]):.2g} % at {factors[-1]:g} times (medians)."
+        + (
+            f" It tells nothing of designs that hardly resist one of their motions: "
+            f"{', '.join(soft)}."
+            if soft
+            else ""
+        )
     )
     report = study.report(finding)
     report.figure(

@@ -134,13 +134,18 @@ def finding(rows: Sequence[Row]) -> str:
             if stopped
             else "All of them open by themselves, keep below their limits and can be built."
         )
-    away = [f"{row['design']} ({row['buckled']})" for row in rows if row["buckled"] != "–"]
+    away = [f"{row['design']} ({_told(row['buckled'])})" for row in rows if row["buckled"] != "–"]
     if away:
         sentences.append(f"Buckled into other states: {', '.join(away)}.")
-    failed = [f"{row['design']} ({row['failed']})" for row in rows if row["failed"] != "–"]
+    failed = [f"{row['design']} ({_told(row['failed'])})" for row in rows if row["failed"] != "–"]
     if failed:
         sentences.append(f"No equilibrium was found for {', '.join(failed)}.")
     return " ".join(sentences)
+
+
+def _told(stages: str) -> str:
+    """Names of stages as a reader knows them."""
+    return stages.replace("_", " and ")
 
 
 def most_changed(designs: list[DrawnDesign], number: int) -> list[DrawnDesign]:
