@@ -149,7 +149,7 @@ CASES = (
     + [
         ("import no.obj --out OUT", "no.obj: no such file"),
         ("import empty --out OUT", "empty: is a folder, expected a file"),
-        ("import text.txt --out OUT", "text.txt: can't be imported (known: .dxf,"),
+        ("import text.txt --out OUT", "text.txt: can't be imported (known: .3dm, .dxf,"),
         ("import study.toml --preview OUT", "study.toml: can't be imported"),
         ("import array.json --out OUT", "array.json: isn't a released umbrella mesh"),
         ("import run/kit.json --out OUT", "kit.json: format: is a file of kop_exudyn already"),

@@ -54,7 +54,10 @@ def test_the_mean_width_is_a_mean_over_directions():
 def test_sizes_neither_turn_nor_move(points, vector, shift, scale, mirror):
     turned = (points * [1, 1, mirror]) @ Rotation.from_rotvec(vector).as_matrix().T
     found = size_of_points(scale * (turned + np.array(shift)))
-    assert found == pytest.approx(scale * size_of_points(points), rel=1e-11)
+    # places are rounded by 1e-14, and angles between the faces of a leaf of 1e-9 by 1e-5
+    thin = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[-1]
+    tolerance = 1e-7 if 0 < thin < 1e-6 else 1e-11
+    assert found == pytest.approx(scale * size_of_points(points), rel=tolerance)
 
 
 @settings(max_examples=50, deadline=None)

@@ -125,7 +125,7 @@ def test_the_schema_knows_all_settings(repository):
     } - {"penalty", "length", "angle"}
     assert set(schema["properties"]["weights"]["properties"]) == {
         field.name for field in fields(Weights)
-    } - {"others"}
+    } - {"others", "level"}  # the level is that of the setting `levelling`
     assert set(schema["properties"]["tolerance"]["properties"]) == {
         field.name for field in fields(VerdictSettings)
     } - {"safety"}  # which is the requirements'

@@ -80,7 +80,8 @@ def test_a_new_design_is_built_better_after_relaxation(reports):
     """Or as well, where relaxation leaves every element nearest to the same part."""
     rows = data_of(reports, "project_new_design")["weights"]
     for row in rows:
-        assert row["reassigned J"] <= row["built J"] <= row["direct J"] * (1 + 1e-9)
+        most = 1 + 1e-9  # the same state, found twice
+        assert row["reassigned J"] <= row["built J"] * most <= row["direct J"] * most**2
     assert min(row["reassigned J"] for row in rows) < rows[0]["direct J"]
 
 
