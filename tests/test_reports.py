@@ -73,6 +73,6 @@ def test_the_kit_that_the_readme_shows_is_the_one_of_its_data():
     result = json.loads((REPORTS / "two_stage" / "result.json").read_text(encoding="utf-8"))
     page = _text((REPORTS / "two_stage" / "index.html").read_text(encoding="utf-8"))
     for line in result["verdict"]:
-        assert line in page
+        assert line.rstrip(".") in page  # the page goes on with how far off the designs are
     for design in result["designs"]:
         assert f"{design['assigned']['fit']['max_percent']:.2g} %" in page, design["name"]
