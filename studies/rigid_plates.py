@@ -92,7 +92,7 @@ def main() -> None:
         f"One design ({stiffer['design']}) with plates of stiffer and stiffer rods: its joints "
         "approach those between rigid plates.",
     ).table("stiffer", stiffer["rows"])
-    report.save({"finding": outcome, "designs": rows, "stiffer": stiffer["rows"]})
+    report.save({"finding": outcome, "plates": rows, "stiffer": stiffer["rows"]})
 
 
 def finding(rods: Rows, rigid: Rows) -> str:

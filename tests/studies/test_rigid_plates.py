@@ -15,7 +15,7 @@ def test_quick_run_reports_what_rigid_plates_cost(tmp_path, monkeypatch):
     runpy.run_path(str(STUDY), run_name="__main__")
     found = json.loads((tmp_path / "data.json").read_text())
     rods, rigid = (
-        [row for row in found["designs"] if row["plates"] == model] for model in ("rods", "rigid")
+        [row for row in found["plates"] if row["plates"] == model] for model in ("rods", "rigid")
     )
     assert len(rods) == len(rigid) == 2
     for a, b in zip(rods, rigid):
