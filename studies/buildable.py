@@ -17,6 +17,7 @@ builder gets.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -55,19 +56,27 @@ COLOURS = tuple(PALETTE[name] for name in ("vermillion", "orange", "green", "sky
 def main() -> None:
     study = Study.from_command_line(__doc__, __file__)
 
-    # 1. The kits: every class (quick: the first) under every requirement.
+    # 1. The kits: every class (quick: the first) under every requirement. They are kept in the
+    # folder of runs; the report is written after every class.
     found: dict[str, dict[str, KitResult]] = {}
-    cases = three_classes(MODELS, study.quick)
+    cases = three_classes(MODELS, study.quick)[: 1 if study.quick else None]
     levels = QUICK if study.quick else tuple(LEVELS)
-    for case in cases[:1] if study.quick else cases:
-        found[case.name] = {}
+    for case in cases:
+        kits: dict[str, KitResult] = {}
         folder = run_folder(replace(case, name=f"{case.name} with snow"), study)
         loaded = replace(case, files=select_files(with_snow(list(case.files), folder)))
         for level in levels:
             result = kit_of(*required(loaded, level, LEVELS[level], study), study.jobs)
             study.kits_s[f"{case.name}, {level}"] = result.wall_s
-            found[case.name][level] = result
+            kits[level] = result
+        found[case.name] = kits
+        write(study, found, [case.name for case in cases if case.name not in found])
 
+
+def write(
+    study: Study, found: Mapping[str, Mapping[str, KitResult]], missing: Sequence[str]
+) -> None:
+    """The report on the classes that have been done; missing : names of the others."""
     # 2. What came out.
     rows = [
         row
@@ -76,6 +85,8 @@ def main() -> None:
         for row in design_rows(name, level, result)
     ]
     outcome = finding(rows)
+    if missing:
+        outcome += f" Not run yet: {', '.join(missing)}."
     report = study.report(outcome)
     report.figure(
         "costs",
@@ -192,10 +203,15 @@ def finding(rows: list[dict[str, Any]]) -> str:
         snow = [row["snow"] for row in own if row["snow"] is not None]
         if snow:
             more.append(f"{sum(value <= CARRIED for value in snow)} of {len(snow)} carry the snow")
+        ends = (
+            f"and they open to {np.median(opened):.2g} % of the target in the median, "
+            f"{max(opened):.2g} % at most"
+            if opened
+            else "and none opens"
+        )
         sentences.append(
-            f"Required {level}: {opens} of {len(own)} designs open into the state shown, and they "
-            f"open to {np.median(opened):.2g} % of the target in the median, {max(opened):.2g} % "
-            f"at most{''.join(f', {one}' for one in more)}."
+            f"Required {level}: {opens} of {len(own)} designs open into the state shown, {ends}"
+            f"{''.join(f', {one}' for one in more)}."
         )
     return " ".join(sentences)
 
@@ -219,7 +235,7 @@ def draw_costs(rows: list[dict[str, Any]]) -> Figure:
     return figure
 
 
-def drawn_levels(results: dict[str, KitResult]) -> list[DrawnDesign]:
+def drawn_levels(results: Mapping[str, KitResult]) -> list[DrawnDesign]:
     """Every design as it opens, without any requirement and with all of them."""
     levels = ("nothing", LAST)
     first = results[levels[0]]

@@ -82,7 +82,8 @@ def test_a_new_design_is_built_better_after_relaxation(reports):
     for row in rows:
         most = 1 + 1e-9  # the same state, found twice
         assert row["reassigned J"] <= row["built J"] * most <= row["direct J"] * most**2
-    assert min(row["reassigned J"] for row in rows) < rows[0]["direct J"]
+    # elements that may still move come nearer to the target than parts do, at every weight
+    assert all(row["relaxed max %"] < row["direct max %"] for row in rows)
 
 
 def test_slits_help_and_more_parts_need_shorter_ones(reports):
