@@ -54,7 +54,7 @@ def _same(shown: str, value: object, where: str) -> None:
     if isinstance(value, float):
         assert float(shown) == pytest.approx(value, rel=1e-3), where
     elif isinstance(value, str):  # a spreadsheet would take a sign at the beginning for a formula
-        assert shown == ("'" if value[:1] in "=+-@" else "") + value, where
+        assert shown == ("'" if value.startswith(("=", "+", "-", "@")) else "") + value, where
 
 
 def test_the_same_check_finds_a_wrong_number():
