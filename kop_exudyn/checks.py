@@ -9,6 +9,8 @@ from typing import Any
 
 from .errors import InputError, did_you_mean
 
+LARGEST = 1e60  # of coordinates and moduli, whose fourth powers stay within double precision
+
 
 def check_whole(field: str, value: Any, least: int = 0) -> None:
     """Refuse what isn't a whole number, or is smaller than `least`."""

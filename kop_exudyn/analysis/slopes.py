@@ -14,10 +14,8 @@ from ..errors import InputError
 from ..rods.section_slopes import section_slopes
 from ..rods.sections import Material, Section
 from ..scene.scene import Scene
-from ..structures.strength import by_section
+from ..structures.strength import by_section, made_of
 from ..structures.stress_bound import Places
-
-_SAME_STIFFNESS = 1e-9  # relative
 
 
 @dataclass(frozen=True)
@@ -90,13 +88,8 @@ def rods_of(scene: Scene, materials: Iterable[Material], source: str) -> list[Ro
     for section, elements in by_section(scene):
         has_section[elements] = True
         for material in materials:
-            same = np.isclose(
-                scene.stiffness[elements],
-                section.stiffness(material),
-                rtol=_SAME_STIFFNESS,
-                atol=0,
-            ).all(axis=1)
-            own = elements[same & ~known[elements]]
+            same = made_of(scene, elements, section, material)
+            own = same[~known[same]]
             known[own] = True
             if len(own) or (id(section) in rigid and material is stiffest):
                 found.append(RodSlopes(section, material, own, {}, {}))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import math
 
-from ..files.documents import LARGEST, SMALLEST
+from ..checks import LARGEST
+from ..files.documents import SMALLEST
 
 
 def part_counts(text: str) -> dict[str, int]:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import LARGEST
 from ..errors import InputError
-from ..files.documents import LARGEST
 from ..geometry.nurbs import spline_points
 from .outlines import Outline, place_of
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import LARGEST
 from ..errors import InputError
-from ..files.documents import LARGEST
 from ..geometry.nurbs import spline_points
 from .drawing import Drawing
 from .outlines import Outline, flattened

@@ -10,11 +10,12 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+from ..checks import LARGEST
 from ..errors import InputError
 
 _LONGEST = 160  # characters of a message that quotes what it found
 # Of numbers, whose powers stay within double precision, and of whole numbers.
-LARGEST, SMALLEST, LARGEST_WHOLE = 1e60, 1e-60, 2**53
+SMALLEST, LARGEST_WHOLE = 1e-60, 2**53
 _OURS = "kop_exudyn/"  # begins the names of our formats
 _PREFIX = "urn:kop_exudyn:"
 _TYPES = {

@@ -14,9 +14,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ..checks import LARGEST
 from ..errors import InputError
 
-_FARTHEST = 1e60  # coordinates of corners: the squares of areas don't overflow
 WELD = 1e-6  # of the size: vertices this near to each other are one
 _MOST_CUTS = 1000  # faces beside empty ones; of more, the empty ones are only left out
 _EMPTY = 1e-9  # of the longest side: a face lower than that has no area
@@ -41,11 +41,10 @@ def cleaned(
             value=int(faces[wrong][0]),
         )
     used = np.unique(faces)
-    far = ~(np.abs(vertices[used]) < _FARTHEST).all(axis=1)
+    far = ~(np.abs(vertices[used]) < LARGEST).all(axis=1)
     if far.any():
         raise InputError(
-            f"corner {used[far][0]} is no place: its coordinates must be numbers below "
-            f"{_FARTHEST:g}",
+            f"corner {used[far][0]} is no place: its coordinates must be numbers below {LARGEST:g}",
             field="vertices",
             value=vertices[used[far][0]].tolist(),
         )

@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..checks import LARGEST
 from ..errors import InputError
-
-_LARGEST = 1e60  # of coordinates, whose powers stay within double precision
 
 
 @dataclass(frozen=True)
@@ -147,7 +146,7 @@ def _vertex(values: Sequence[str], place: str) -> list[float]:
         point = [float(value) for value in values[:3]]
     except ValueError:
         point = []
-    if len(point) != 3 or not all(abs(value) <= _LARGEST for value in point):
+    if len(point) != 3 or not all(abs(value) <= LARGEST for value in point):
         raise InputError(
             "expected three coordinates of a vertex, within 1e60",
             field=place,

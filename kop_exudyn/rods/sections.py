@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import check_positive
+from ..checks import LARGEST, check_positive
 from ..errors import InputError
 
-_LARGEST = 1e60  # its fourth power is still a number
 # Odd terms of the torsion series; the remainder of n terms falls with n^-5, so this many reach
 # round-off.
 TORSION_TERMS = np.arange(1, 400, 2)
@@ -37,7 +36,7 @@ class Material:
     elastic_limit: float | None = None
 
     def __post_init__(self) -> None:
-        check_positive("material.young", self.young, below=_LARGEST)
+        check_positive("material.young", self.young, below=LARGEST)
         if not -1 < self.poisson <= 0.5:
             raise InputError(
                 "Poisson's ratio must lie in (-1, 0.5]",
@@ -46,7 +45,7 @@ class Material:
             )
         for name in ("density", "elastic_limit"):
             if getattr(self, name) is not None:
-                check_positive(f"material.{name}", getattr(self, name), below=_LARGEST)
+                check_positive(f"material.{name}", getattr(self, name), below=LARGEST)
 
     @property
     def shear_modulus(self) -> float:
@@ -103,8 +102,8 @@ def rectangle(width: float, height: float) -> Section:
     109), with the shorter side b and the longer a:  J = a b^3 / 3 (1 - 192 b / (pi^5 a) sum_odd
     tanh(n pi a / 2 b) / n^5).
     """
-    check_positive("section.width", width, below=_LARGEST)
-    check_positive("section.height", height, below=_LARGEST)
+    check_positive("section.width", width, below=LARGEST)
+    check_positive("section.height", height, below=LARGEST)
     b, a = sorted((width, height))
     n = TORSION_TERMS
     ratio = n * np.pi * a / (2 * b)
@@ -137,7 +136,7 @@ def half_lapped(section: Section) -> Section:
 def drilled(section: Section, diameter: float) -> Section:
     """A rectangle with a hole along z through its joints. Raises InputError for a hole as wide as
     the section."""
-    check_positive("section.joint_hole", diameter, below=_LARGEST)
+    check_positive("section.joint_hole", diameter, below=LARGEST)
     width, height = (float(side) for side in np.ptp(section.outline, axis=0))
     if diameter >= width:
         raise InputError(
@@ -175,7 +174,7 @@ def thickened(section: Section, share: float) -> Section:
     Torsion of other sections than rectangles is taken to grow as that of thin strips.
     Raises InputError for a share that is not positive.
     """
-    check_positive("share", share, below=_LARGEST)
+    check_positive("share", share, below=LARGEST)
     extents = np.ptp(section.outline, axis=0)
     if np.isclose(*extents):
         scales = np.array([share, share])
@@ -203,7 +202,7 @@ def thickened(section: Section, share: float) -> Section:
 
 def circle(radius: float) -> Section:
     """Solid circle. Shear factor 9/10, the classical energy value of a circle."""
-    check_positive("section.radius", radius, below=_LARGEST)
+    check_positive("section.radius", radius, below=LARGEST)
     turns = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     quarter = np.pi * radius**4 / 4
     return Section(
@@ -238,7 +237,7 @@ def general(
         ("shear_y", shear_y),
         ("shear_z", shear_z),
     ):
-        check_positive(f"section.{name}", value, below=_LARGEST)
+        check_positive(f"section.{name}", value, below=LARGEST)
     if outline is None:
         y, z = np.sqrt(3 * inertia_z / area), np.sqrt(3 * inertia_y / area)
         outline = np.array([[y, z], [-y, z], [-y, -z], [y, -z]])
@@ -258,7 +257,7 @@ def general(
             value=outline,
         )
     if torsion_modulus is not None:
-        check_positive("section.torsion_modulus", torsion_modulus, below=_LARGEST)
+        check_positive("section.torsion_modulus", torsion_modulus, below=LARGEST)
     else:
         torsion_modulus = float(np.min(np.ptp(outline, axis=0)))  # as of a thin strip
     return Section(area, inertia_y, inertia_z, torsion, shear_y, shear_z, outline, torsion_modulus)

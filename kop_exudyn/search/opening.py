@@ -23,6 +23,7 @@ def opened_stage(
     numbers: Iterator[int] | None = None,
     last_resorts: bool = True,
     seen: Sequence[StageResult] = (),
+    there: StageResult | None = None,
 ) -> StageResult:
     """Designs that open into their shape by themselves, and keep to it whatever errors of the
     workshop do: rounds from where they open into, again and again.
@@ -38,6 +39,7 @@ def opened_stage(
     numbers : of the rounds, where this isn't the first call: every SQP has a name of its own
     last_resorts : see `forgiving_stage`
     seen : results on the way to `start`
+    there : what `start` opens into, where that is known
 
     The result's states are those that the designs open into, unless one doesn't open at all.
     """
@@ -48,7 +50,8 @@ def opened_stage(
     found: list[StageResult] = []
     on_the_way = list(seen)
     for number in range(settings.redeployments + 1):
-        opened = stages.judged(replace(result, designs=stages.redeployed(result)))
+        opened = stages.opened_by_itself(result) if there is None else there
+        there = None
         log.info(
             "opened from the assembly: J = %.5g, from %.5g", value_of(opened), value_of(result)
         )

@@ -311,6 +311,10 @@ class Stages:
         found = {**found, **secured.confirm(opened)}
         return [found[n] for n in range(len(result.designs))]
 
+    def opened_by_itself(self, result: StageResult) -> StageResult:
+        """The states that a result's designs open into from their assembly."""
+        return self.judged(replace(result, designs=self.redeployed(result)))
+
     def to_parts(self, relaxed: StageResult) -> tuple[StageResult, StageResult]:
         """Follow the straight path from the relaxed elements to their parts, watching for snaps.
 

@@ -161,10 +161,11 @@ def forgiving_from_starts(
     optimised = {n for n, _ in found.others}
     kept = next(n for n, one in enumerate(tried) if one.kept)
     winners = [] if result.snapping else [(kept, result)]
-    put_off: list[tuple[float, int, StageResult, Iterator[int]]] = []
+    put_off: list[tuple[StageResult, int, StageResult, Iterator[int]]] = []
 
-    def opened_from(n: int, end: StageResult, numbers: Iterator[int]) -> None:
-        opened = opened_stage(stages, end, before, numbers, False, found.seen.get(n, ()))
+    def opened_from(n: int, end: StageResult, numbers: Iterator[int], there: StageResult) -> None:
+        seen = found.seen.get(n, ())
+        opened = opened_stage(stages, end, before, numbers, False, seen, there)
         if opened.value is not None and not opened.snapping:
             winners.append((n, opened))
 
@@ -177,9 +178,9 @@ def forgiving_from_starts(
             tried[n] = replace(tried[n], optimised=end.value)
         if end.value is None:
             continue
-        there = _opens_at(stages, end)
-        if there <= _PROMISING * end.merit:
-            opened_from(n, end, numbers)
+        there = stages.opened_by_itself(end) if stages.required.opening else end
+        if there.merit <= _PROMISING * end.merit:
+            opened_from(n, end, numbers, there)
         else:
             put_off.append((there, n, end, numbers))
             if n not in optimised:  # those of the others were looked at before
@@ -188,10 +189,10 @@ def forgiving_from_starts(
                     winners.append((n, secured_steps(stages, other, numbers, forgiving=True)))
         if any(won.merit <= dear for _, won in winners):
             break
-    for k, (_, n, end, own) in enumerate(sorted(put_off, key=lambda one: one[0])):
+    for k, (there, n, end, own) in enumerate(sorted(put_off, key=lambda one: one[0].merit)):
         if any(won.merit <= dear for _, won in winners) or (winners and k > 0):
             break
-        opened_from(n, end, own)
+        opened_from(n, end, own, there)
     if not winners:
         return _resorted(stages, result, first, before)
     which, won = min(winners, key=lambda pair: pair[1].merit)
@@ -213,13 +214,6 @@ def _resorted(
     """What the last resorts make of a result with designs that snap."""
     resorted = forgiving_stage(stages, result, (), count(first), before)
     return replace(resorted, jumps=result.jumps)
-
-
-def _opens_at(stages: Stages, end: StageResult) -> float:
-    """J of the states that designs open into by themselves."""
-    if not stages.required.opening:
-        return end.merit
-    return stages.judged(replace(end, designs=stages.redeployed(end))).merit
 
 
 def model_starts(

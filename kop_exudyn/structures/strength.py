@@ -139,16 +139,17 @@ def material_values(
         for material in materials:
             value = getattr(material, name)
             if value is not None:
-                same = elements[
-                    np.isclose(
-                        scene.stiffness[elements],
-                        section.stiffness(material),
-                        rtol=_SAME_STIFFNESS,
-                        atol=0,
-                    ).all(axis=1)
-                ]
+                same = made_of(scene, elements, section, material)
                 values[same] = choose(values[same], value)
     return values
+
+
+def made_of(scene: Scene, elements: np.ndarray, section: Section, material: Material) -> np.ndarray:
+    """Those of a section's elements whose stiffness a material explains."""
+    same = np.isclose(
+        scene.stiffness[elements], section.stiffness(material), rtol=_SAME_STIFFNESS, atol=0
+    )
+    return elements[same.all(axis=1)]
 
 
 def _materials_in(values: Any, depth: int) -> Iterator[Material]:

@@ -19,9 +19,8 @@ from ..errors import SimulationFailure
 from ..rods.sections import Material, Section, thickened, thickness_of
 from ..scene.scene import Scene
 from .base import Design
-from .strength import by_section, rod_strength
+from .strength import by_section, made_of, rod_strength
 
-_SAME_STIFFNESS = 1e-9  # relative
 _CLOSE = 0.01  # utilisation within that below what is allowed is near enough
 _TRIALS = 6
 _LEAST, _MOST = 0.05, 20.0  # thickness, as a multiple of the present one
@@ -38,13 +37,7 @@ def thickened_scene(scene: Scene, materials: tuple[Material, ...], share: float)
     for section, elements in by_section(scene):
         thick = sections[id(section)] = thickened(section, share)
         for material in materials:
-            same = np.isclose(
-                scene.stiffness[elements],
-                section.stiffness(material),
-                rtol=_SAME_STIFFNESS,
-                atol=0,
-            ).all(axis=1)
-            stiffness[elements[same]] = thick.stiffness(material)
+            stiffness[made_of(scene, elements, section, material)] = thick.stiffness(material)
     chains = tuple(
         chain
         if chain.section is None

@@ -7,7 +7,7 @@ simulated, and the joints of an equilibrium with the parameters that the files g
 
 import numpy as np
 import pytest
-from support.workshop import Files, realised, rest_shape
+from support.workshop import Files, lay_out_all, realised
 
 from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.fabrication.folder import export_workshop
@@ -56,18 +56,7 @@ def case(request, shells, clustering, tmp_path_factory):
 def test_every_lamella_is_laid_out_as_it_was_simulated(case):
     """Joints of every lamella in its own plane, from the files and from the scene's rest shape."""
     _, parts, files = case
-    compared = 0
-    for pieces in parts.designs:
-        scene = pieces.design.scene(pieces.design.fitted_role.name)
-        q = realised(pieces)
-        lengths = scene.rest_lengths(q)
-        for rows in files.lamellas(pieces.design.name).values():
-            joints = files.laid_out(rows)
-            wanted = rest_shape(pieces, scene, q, lengths, rows)
-            assert list(joints) == list(wanted)
-            for joint, at in joints.items():
-                np.testing.assert_allclose(at, 1000 * wanted[joint], atol=MM)
-                compared += 1
+    compared = lay_out_all(parts, files, MM)
     assert compared == 2 * sum(len(p.design.joints) for p in parts.designs)
 
 

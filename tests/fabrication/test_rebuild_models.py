@@ -7,7 +7,7 @@ assembled, before they are opened. Their equilibria follow from these lengths an
 
 import numpy as np
 import pytest
-from support.workshop import Files, realised, rest_shape
+from support.workshop import Files, lay_out_all, realised
 
 from kop_exudyn.fabrication.assembly import write_assembly_plan
 from kop_exudyn.fabrication.blanks import Blanks
@@ -19,6 +19,7 @@ from kop_exudyn.fabrication.pieces import parts_list
 from kop_exudyn.io.datasets import load_designs
 from kop_exudyn.kit.cluster import cluster
 from kop_exudyn.structures.serving import served_by
+from kop_exudyn.structures.stacking import stacked_groups, stacked_parameters
 
 MM = 0.1
 # m: sides that have room for their bolts, slits of a few millimetres
@@ -40,9 +41,7 @@ def every_other_grid(repository):
 def kit_of(designs, sizes, seed=0):
     """Designs and their pieces of a kit of so many parts."""
     designs = served_by(designs, sizes)
-    offsets = np.cumsum([0, *(len(design.parameters) for design in designs)])
-    groups = [g.shifted(at) for d, at in zip(designs, offsets) for g in d.groups]
-    q = np.concatenate([design.parameters for design in designs])
+    groups, q = stacked_groups(designs), stacked_parameters(designs)
     found = cluster(groups, q, sizes, seed=seed, bounds=BOUNDS)
     return designs, parts_list(found.kit, found.assignment, designs)
 
@@ -77,18 +76,7 @@ def case(request, repository, tmp_path_factory):
 def test_every_lamella_of_every_model_is_laid_out(case):
     _, parts, files, slit = case
     assert bool(files.slides) == slit
-    compared = 0
-    for pieces in parts.designs:
-        scene = pieces.design.scene(pieces.design.fitted_role.name)
-        q = realised(pieces)
-        lengths = scene.rest_lengths(q)
-        for rows in files.lamellas(pieces.design.name).values():
-            joints = files.laid_out(rows)
-            wanted = rest_shape(pieces, scene, q, lengths, rows)
-            assert list(joints) == list(wanted)
-            for joint, at in joints.items():
-                np.testing.assert_allclose(at, 1000 * wanted[joint], atol=MM)
-                compared += 1
+    compared = lay_out_all(parts, files, MM)
     assert compared >= sum(len(p.design.joints) for p in parts.designs)
 
 

@@ -28,10 +28,13 @@ def search(monkeypatch):
         seen.append(start)
         return of(start)["end"]
 
-    def opened(stages, end, before, numbers, last_resorts, seen):
-        assert not last_resorts
+    def ended(end):
+        return next(outcome for outcome in outcomes.values() if outcome["end"] is end)
+
+    def opened(stages, end, before, numbers, last_resorts, seen, there):
+        assert not last_resorts and there.value == ended(end)["opens"]  # not opened once more
         calls.append(("rounds", end.value))
-        return next(one["rounds"] for one in outcomes.values() if one["end"] is end)
+        return ended(end)["rounds"]
 
     def substitute(stages, best, seen):
         calls.append(("on the way", seen[0].value))
@@ -46,12 +49,12 @@ def search(monkeypatch):
     monkeypatch.setattr(starts, "substitute", substitute)
     monkeypatch.setattr(starts, "secured_steps", lambda stages, other, numbers, forgiving: other)
     monkeypatch.setattr(starts, "forgiving_stage", resorts)
-    monkeypatch.setattr(
-        starts,
-        "_opens_at",
-        lambda stages, end: next(o["opens"] for o in outcomes.values() if o["end"] is end),
+    stages = SimpleNamespace(
+        rule=SimpleNamespace(parts_move=True),
+        required=SimpleNamespace(opening=True),
+        confirmed=lambda one: one,
+        opened_by_itself=lambda end: result(ended(end)["opens"]),
     )
-    stages = SimpleNamespace(rule=SimpleNamespace(parts_move=True), confirmed=lambda one: one)
     return stages, outcomes, calls
 
 

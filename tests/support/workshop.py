@@ -146,3 +146,26 @@ def rest_shape(pieces, scene, q, lengths, rows):
             if last in joints:
                 found[joints[last]] = at
     return found
+
+
+def lay_out_all(parts, files, atol):
+    """Lay out every lamella of every design in its own plane, and compare its joints with the
+    scene's rest shape.
+
+    parts : the kit's; files : `Files`, all that is laid out from; atol : mm
+
+    Returns how many joints were compared.
+    """
+    compared = 0
+    for pieces in parts.designs:
+        scene = pieces.design.scene(pieces.design.fitted_role.name)
+        q = realised(pieces)
+        lengths = scene.rest_lengths(q)
+        for rows in files.lamellas(pieces.design.name).values():
+            joints = files.laid_out(rows)
+            wanted = rest_shape(pieces, scene, q, lengths, rows)
+            assert list(joints) == list(wanted)
+            for joint, at in joints.items():
+                np.testing.assert_allclose(at, 1000 * wanted[joint], atol=atol)
+                compared += 1
+    return compared
