@@ -84,7 +84,8 @@ def about_stress(
         return utilisation, []
     worst = max(known, key=lambda name: known[name])
     limit = "its elastic limit" if safety == 1 else f"its elastic limit over {safety:g}"
-    why = f"stressed to {100 * safety * known[worst]:.0f} % of {limit} ({worst} state)"
+    where = worst if " " in worst else f"{worst} state"  # stations: "opened by 50%"
+    why = f"stressed to {100 * safety * known[worst]:.0f} % of {limit} ({where})"
     if inputs is not None:
         as_given = [found.largest for found in design_strength(design, inputs).values()]
         own = max((value for value in as_given if value is not None), default=0.0)

@@ -270,8 +270,16 @@ def judge_given(
 
 def _way(design: Design, opened: Evaluation) -> dict[str, tuple[Scene, Equilibrium]]:
     """By station, the states that a design is opened through, with their scenes; empty where they
-    are not known."""
-    if design.way is None or not opened.way:
+    are not known.
+
+    Those of a design without stations are of a path that is loaded otherwise, to be looked at for
+    its rods' stress only.
+    """
+    if design.way is None:
+        scene = design.scene(design.fitted_role.name)
+        passed = list(design.opened_through(opened.q, opened.equilibria).items())
+        return {name: (scene, state) for name, state in passed[:-1]}
+    if not opened.way:
         return {}
     stations = zip(design.way.stations, opened.way)
     return {station.name: (design.scene(station.scene), state) for station, state in stations}

@@ -116,7 +116,7 @@ def opening_path(
     if frames < 1:
         return []
     try:
-        opened = design.opened_through(final.q, equilibria)
+        opened = list(design.opened_through(final.q, equilibria).values())
     except SimulationFailure as failure:
         log.info("%s: its opening isn't shown from the assembly on: %s", design.name, failure)
         return _closed(design, final, frames)

@@ -186,16 +186,18 @@ class Design(ABC):
 
     def opened_through(
         self, q: Parameters, equilibria: Mapping[str, Equilibrium]
-    ) -> list[Equilibrium]:
-        """The states that a builder opens the design through, in order, the deployed one last;
-        none of what is assembled in place.
+    ) -> dict[str, Equilibrium]:
+        """The states that a builder opens the design through, in order and by name, the deployed
+        one last; none of what is assembled in place.
 
         q : (nq,) parameters; equilibria : those of the other roles at q
         Raises SimulationFailure where a state isn't found.
         """
         if self.way is None:
-            return []
-        return self.way.opened(self.systems, q, self.assembled(q, equilibria))
+            return {}
+        found = self.way.opened(self.systems, q, self.assembled(q, equilibria))
+        names = [station.name for station in (*self.way.stations, self.way.deployed)]
+        return dict(zip(names, found))
 
     @property
     def free(self) -> Indices:

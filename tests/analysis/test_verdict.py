@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.grids import coarse_grid
+from support.umbrellas import PLATES, hexagon
 
 from kop_exudyn.analysis.verdict import Buildable, VerdictSettings, judge
 from kop_exudyn.errors import InputError, SimulationFailure
@@ -15,6 +16,7 @@ from kop_exudyn.search.objective import DesignObjective
 from kop_exudyn.search.tolerance import Sample
 from kop_exudyn.structures.base import design_from_dict
 from kop_exudyn.structures.strength import design_strength
+from kop_exudyn.structures.umbrella.generator import design_on_surface, height_field
 
 FEW = VerdictSettings(samples=2)
 
@@ -167,3 +169,35 @@ def test_parts_that_cannot_be_cut(sound):
 def test_settings(wrong):
     with pytest.raises(InputError, match=next(iter(wrong))):
         VerdictSettings(**wrong)
+
+
+@pytest.fixture(scope="module")
+def umbrella():
+    """A saddle of two rings of cells, with elastic limits of arms and plates, N / mm^2."""
+    saddle = height_field(lambda x, y: (x**2 - y**2) / 900, 900.0, 30)
+    data = design_on_surface("saddle", hexagon(2), *saddle, plates=PLATES, limits=(100.0, 300.0))
+    return design_from_dict(data)
+
+
+def test_umbrella_meshes_are_looked_at_on_the_way(umbrella):
+    objective = DesignObjective(umbrella)
+    kept = objective.judge(umbrella.parameters, dict(objective.reference.equilibria))
+    used = judge(objective, kept, objective.opened(kept), FEW).utilisation
+    names = list(used)
+    assert names[:2] == ["deployed", "compact"] and len(names) > 4
+    assert all(name.startswith("stage ") for name in names[2:])
+    # lightly guided, the mesh is strained on its way less than at its end
+    assert 0 < max(used[name] for name in names[1:]) < used["deployed"]
+
+
+def test_a_way_that_overstrains_the_rods_stops_the_mesh(umbrella, monkeypatch):
+    """Guided by force, the mesh is strained beyond a limit that its deployed state keeps."""
+    monkeypatch.setattr("kop_exudyn.structures.umbrella.opening._LIGHT", 1.0)
+    objective = DesignObjective(umbrella)
+    kept = objective.judge(umbrella.parameters, dict(objective.reference.equilibria))
+    free = judge(objective, kept, objective.opened(kept), replace(FEW, samples=0))
+    worst = max(free.utilisation, key=lambda name: free.utilisation[name])
+    assert worst.startswith("stage ") and free.largest > 1.2 * free.utilisation["deployed"]
+    strict = replace(FEW, samples=0, safety=1 / (0.9 * free.largest))
+    (stop,) = judge(objective, kept, objective.opened(kept), strict).stops
+    assert stop.cause == "stress" and f"({worst})" in stop.why

@@ -81,7 +81,7 @@ def test_arms_meet_the_x_joints_upright_and_have_their_length(design):
 
 @pytest.mark.parametrize("factor", [1.0, 1.2])
 def test_the_compact_state_is_unstressed_for_any_lengths(design, factor):
-    model, q = design._model, factor * design.parameters
+    model, q = design.model, factor * design.parameters
     system = System(model.scene)
     system.set_parameters(q)
     assert system.assemble(model.compact(q, 0.0)).elastic < 1e-20 * model.scene.stiffness.max()

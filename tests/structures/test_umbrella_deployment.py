@@ -55,7 +55,7 @@ def test_gradients_with_limits_pressed():
     design = design_from_dict(make("tight"))
     eq = refine(design.systems["deployed"], design.deploy()["deployed"])
     system, q = design.systems["deployed"], design.parameters
-    limits = design._model.limits
+    limits = design.model.limits
     assert limits.touched(eq.state).any()
     slope = Sensitivities(system, eq).energy_gradient
     rng = np.random.default_rng(1)

@@ -108,7 +108,7 @@ def test_a_mesh_without_pins_is_held_at_places_of_its_target(plate_model):
     content = {key: value for key, value in bowl().items() if key != "pins"}
     design = design_from_dict(content | {"plate_model": plate_model})
     deployed = design.deploy()["deployed"]
-    scene, anchor = design.scene(), design._anchor
+    scene, anchor = design.scene(), design.anchor
     x = deployed.state.positions[design.joints]
     assert scene.pinned.sum() == 6 and len(set(anchor.joints.tolist())) == 3
     assert np.allclose(x[anchor.joints, anchor.axes], anchor.values, rtol=0, atol=1e-9 * scene.size)

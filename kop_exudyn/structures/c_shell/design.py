@@ -230,9 +230,9 @@ class CShell(Design):
 
     def opened_through(
         self, q: np.ndarray, equilibria: Mapping[str, Equilibrium]
-    ) -> list[Equilibrium]:
+    ) -> dict[str, Equilibrium]:
         """The flat assembly, and the states at all stations."""
-        return [equilibria["rest"], *super().opened_through(q, equilibria)]
+        return {"rest": equilibria["rest"], **super().opened_through(q, equilibria)}
 
     @property
     def _rest_opening(self) -> float:

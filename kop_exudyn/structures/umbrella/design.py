@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import InputError, SimulationFailure
+from ...errors import InputError
 from ...geometry.centring import middle_of, moved
 from ...geometry.extent import size_of_points
 from ...kit.groups import ElementGroup
@@ -28,7 +28,7 @@ from ..fitting import best_placement
 from ..hardware import CellHardware
 from ..loads import hold_in_place
 from .bodies import RODS, joint_bodies
-from .deployment import Deployment, Solver, Stage, drawn_towards, follow, state_of
+from .deployment import Deployment
 from .hardware import cell_hardware
 from .layout import BaseMesh, Plates, umbrella_mesh
 from .mesh import UmbrellaMesh, UmbrellaTarget
@@ -36,7 +36,7 @@ from .pins import Anchor, Pins, anchor_on, pins_from_dict
 from .release import centred_release, release_mesh
 
 if TYPE_CHECKING:
-    from ...equilibrium.equilibria import Equilibrium, Start
+    from ...equilibrium.equilibria import Equilibrium
     from ...scene.attraction import Attraction
     from ...scene.scene import Scene
     from ...scene.state import State
@@ -127,7 +127,7 @@ class Umbrella(Design):
         return design
 
     @cached_property
-    def _model(self) -> UmbrellaScene:
+    def model(self) -> UmbrellaScene:
         from .scene import UmbrellaModel, umbrella_scene
 
         return umbrella_scene(
@@ -146,29 +146,29 @@ class Umbrella(Design):
     def scene(self, role: str = "deployed") -> Scene:
         """The final state's scene: actuators of weight 1, no attraction, on pins or held in
         place."""
-        return self._held if self.pins is None else self._pinned
+        return self.held if self.pins is None else self._pinned
 
     @cached_property
     def _pinned(self) -> Scene:
         """With the design's pins."""
         assert self.pins is not None
         return self.pins.scene(
-            self._model.scene, self.joints[self.pins.joints], self.mesh.lengths.size
+            self.model.scene, self.joints[self.pins.joints], self.mesh.lengths.size
         )
 
     @cached_property
-    def _anchor(self) -> Anchor | None:
+    def anchor(self) -> Anchor | None:
         """Where an unsupported mesh is held, by places in its target."""
         target = self.mesh.target
         return None if target is None else anchor_on(target, self.mesh.central_crossing)
 
     @cached_property
-    def _held(self) -> Scene:
+    def held(self) -> Scene:
         """Held at its anchor, or, without a target, with the central X joint in the compact
         state."""
-        scene = self._model.scene
-        if self._anchor is not None:
-            return self._anchor.scene(scene, self.joints)
+        scene = self.model.scene
+        if self.anchor is not None:
+            return self.anchor.scene(scene, self.joints)
         pinned = np.zeros(scene.n_dofs, bool)
         centre = self.joints[self.mesh.central_crossing]
         pinned[6 * centre : 6 * centre + 6] = True
@@ -189,92 +189,19 @@ class Umbrella(Design):
         return {"deployed": self._opened(q, solve)}
 
     def _opened(self, q: np.ndarray, solve: Solve | None = None) -> Equilibrium:
-        try:
-            *done, final = follow(*self._path(q, solve), self.deployment, self.name)
-        except SimulationFailure as failure:
-            try:
-                *done, final = follow(
-                    *self._path(q, solve, gentle=True), self.deployment, self.name
-                )
-            except SimulationFailure:
-                raise failure from None
+        from .opening import Opening
+
+        *done, final = Opening(self, q, solve).followed(self.deployment)
         return final.after(*done)
 
     def opened_through(
         self, q: np.ndarray, equilibria: Mapping[str, Equilibrium]
-    ) -> list[Equilibrium]:
-        """The compact state and those at the stages of the deployment, each placed like the next
-        one: the last stage moves the open mesh to where it is held."""
-        from ...equilibrium.system import System
+    ) -> dict[str, Equilibrium]:
+        """The compact state and those at the stages of the deployment, by name; see
+        `Opening.through`."""
+        from .opening import Opening
 
-        compact, stages, reach = self._path(q, None)
-        found = follow(compact, stages, reach, self.deployment, self.name)
-        system = System(self._model.scene)
-        system.set_parameters(q)
-        energy = system.assemble(compact)
-        first = replace(
-            found[0],
-            state=compact,
-            stress=system.stress(),
-            elastic_energy=energy.elastic,
-            potential=energy.potential,
-        )
-        path = [found[-1]]
-        for state in [*found[-2::-1], first]:
-            if _openness(state.state) < _openness(path[-1].state):  # else a stage tried in vain
-                path.append(replace(state, state=self._placed_like(path[-1].state, state.state)))
-        return path[::-1]
-
-    def _placed_like(self, other: State, state: State) -> State:
-        x, y = (each.positions[self.joints] for each in (state, other))
-        placed = best_placement(x, y, np.full(len(x), 1 / len(x)))
-        return state.transformed(placed.rotation, placed.translation)
-
-    def _path(
-        self, q: np.ndarray, solve: Solve | None, gentle: bool = False
-    ) -> tuple[State, list[Stage], Solver]:
-        """The compact state as near to the target as it can be, the stages, and what solves one."""
-        from ...equilibrium.newton import NewtonOptions
-        from ...equilibrium.newton import solve as fast
-        from ...equilibrium.system import System
-
-        solve = fast if solve is None else solve
-        model, attraction = self._model, self.attractions()
-        compact = model.compact(q, self.deployment.angle)
-        if attraction:
-            x = np.concatenate([term.queries(compact) for term in attraction])
-            places = np.concatenate([term.targets for term in attraction])
-            placed = best_placement(x, places, np.full(len(x), 1 / len(x)))
-            compact = compact.transformed(placed.rotation, placed.translation)
-        scene = model.scene if attraction else self._held
-        upright = model.actuators.spacings(compact)
-
-        def reach(stage: Stage, start: State | Equilibrium, iterations: int) -> Equilibrium:
-            if stage.final:
-                options, begin = NewtonOptions(max_iterations=iterations), self._laid(q, start)
-                return solve(self.systems["deployed"], q, begin, options=options)
-            spacing = upright + stage.opening * (self.mesh.spacing - upright)
-            actuators = model.actuators.weighted(stage.actuators * model.energy_scale, spacing)
-            drawn = (
-                drawn_towards(term, compact, stage.opening, stage.attraction) for term in attraction
-            )
-            system = System(scene.with_terms(actuators, model.limits, *drawn))
-            options = NewtonOptions(tolerance=self.deployment.tolerance, max_iterations=iterations)
-            return solve(system, q, start, options=options)
-
-        return compact, self.deployment.path(gentle), reach
-
-    def _laid(self, q: np.ndarray, state: State | Equilibrium) -> State | Start | Equilibrium:
-        """An open mesh, moved rigidly to where the final state is held."""
-        from ...equilibrium.equilibria import Equilibrium, Start
-
-        if self.pins is not None:
-            places = q[self.mesh.lengths.size :].reshape(-1, 3)
-            return self.pins.aligned(state_of(state), self.joints[self.pins.joints], places)
-        if self._anchor is None:
-            return state
-        placed = self._anchor.placed(state_of(state), self.joints)
-        return Start(placed, stress=state.stress if isinstance(state, Equilibrium) else None)
+        return Opening(self, q).through(equilibria.get("deployed"))
 
     def attractions(self) -> tuple[Attraction, ...]:
         """The attraction during deployment, of weight 1: X joints and cell midpoints to their
@@ -294,7 +221,7 @@ class Umbrella(Design):
         n = np.count_nonzero(known) + np.count_nonzero(placed)
         if not n:
             return ()
-        weight = self.deployment.share / (3 * n) * self._model.energy_scale / self.mesh.size**2
+        weight = self.deployment.share / (3 * n) * self.model.energy_scale / self.mesh.size**2
         centres = self._bodies.body[self.mesh.centres]
         pulled = ((self.joints, target.crossings, known), (centres, target.plates, placed))
         return tuple(
@@ -351,7 +278,7 @@ class Umbrella(Design):
 
     def spacings(self, state: State) -> np.ndarray:
         """Distance (n_cells,) of the two plates of every cell."""
-        return self._model.actuators.spacings(state)
+        return self.model.actuators.spacings(state)
 
     def with_lengths(self, lengths: np.ndarray) -> Umbrella:
         """The same design with other arm lengths (n_cells, 2) as its input."""
@@ -474,11 +401,6 @@ def _places(given: Sequence[Any] | None, n: int) -> np.ndarray:
     if given is None:
         return np.full((n, 3), np.nan)
     return np.array([[np.nan] * 3 if place is None else place for place in given], float)
-
-
-def _openness(state: State) -> float:
-    """Mean turn of all hinges, rad."""
-    return float(np.abs(state.angles).mean())
 
 
 def _count(data: Mapping[str, Any], field: str, default: int) -> int:
