@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..arrays import Indices
 from ..equilibrium.equilibria import Equilibrium
 from ..equilibrium.newton import NewtonOptions, solve
 from ..equilibrium.sensitivities import Sensitivities
@@ -118,7 +119,42 @@ class LoadBound:
 
     def _apart(self, a: Equilibrium, b: Equilibrium) -> float:
         """How far apart a body of the rods is in two states, as a share of the size."""
-        return float(np.linalg.norm(self._moves(a, b), axis=1).max()) / self._size
+        return float(np.linalg.norm(self.moves(a, b), axis=1).max()) / self._size
+
+    def moves(self, unloaded: Equilibrium, loaded: Equilibrium) -> np.ndarray:
+        """(n, 3) how far the rods' n bodies move under the loads."""
+        return loaded.state.positions[self._nodes] - unloaded.state.positions[self._nodes]
+
+    def moves_adjoint(
+        self, sensitivities: Sensitivities, factor: float, loaded: Equilibrium, weights: np.ndarray
+    ) -> np.ndarray:
+        """(nq,) the derivative of sum(weights * moves) in the elements, by two adjoint solves.
+
+        sensitivities : of the unloaded state
+        factor, loaded : of the loads, and the state under them
+        weights : (n, 3)
+        """
+        dofs = (6 * self._nodes[:, None] + np.arange(3)).ravel()
+        asked = next(one for one in self._steps if one.factor == factor)
+        both = Sensitivities(self._system(asked), loaded).adjoint(dofs, weights.ravel())
+        nq = len(sensitivities.equilibrium.q)
+        of_places = sensitivities.adjoint(self._moved, both[nq:])
+        return both[:nq] + of_places - sensitivities.adjoint(dofs, weights.ravel())
+
+    def moves_derivatives(
+        self, sensitivities: Sensitivities, factor: float, loaded: Equilibrium
+    ) -> np.ndarray:
+        """(n, 3, nq) derivatives of `moves` in the elements; parameters as of `moves_adjoint`."""
+        asked = next(one for one in self._steps if one.factor == factor)
+        own = Sensitivities(self._system(asked), loaded)
+        places = sensitivities.rows(self._moved)
+        return self._moves_derivatives(sensitivities, own, places, self._nodes)
+
+    def _moves_derivatives(
+        self, sensitivities: Sensitivities, own: Sensitivities, places: np.ndarray, nodes: Indices
+    ) -> np.ndarray:
+        loaded_q = _chained(own.positions(nodes), places)
+        return (loaded_q - sensitivities.positions(nodes)).reshape(len(nodes), 3, -1)
 
     def utilisation(
         self, unloaded: Equilibrium, loaded: Mapping[float, Equilibrium]
@@ -133,7 +169,7 @@ class LoadBound:
         for asked in self._steps:
             state = loaded[asked.factor]
             if asked.deflection:
-                moved = np.linalg.norm(self._moves(unloaded, state), axis=1)
+                moved = np.linalg.norm(self.moves(unloaded, state), axis=1)
                 found[self._deflection] = float(moved.max()) / self._allowed(unloaded)[0]
             if asked.stress is not None:
                 found[self._stress] = asked.stress.utilisation(state)
@@ -170,21 +206,16 @@ class LoadBound:
         self, sensitivities: Sensitivities, own: Sensitivities, places: np.ndarray
     ) -> Rows:
         unloaded = sensitivities.equilibrium
-        moved = self._moves(unloaded, own.equilibrium)
+        moved = self.moves(unloaded, own.equilibrium)
         size = np.linalg.norm(moved, axis=1)
         allowed, allowed_q = self._allowed(unloaded, sensitivities)
         some = np.argsort(-size)[:MOST_ROWS]
         some = some[size[some] > NEAR * allowed]
-        loaded_q = _chained(own.positions(self._nodes[some]), places)
-        moved_q = (loaded_q - sensitivities.positions(self._nodes[some])).reshape(len(some), 3, -1)
+        moved_q = self._moves_derivatives(sensitivities, own, places, self._nodes[some])
         unit = moved[some] / size[some][:, None]
         jacobian = np.einsum("mi,miq->mq", unit, moved_q) / allowed
         jacobian -= np.outer(size[some] / allowed**2, allowed_q)
         return Rows(size[some] / allowed - 1.0, jacobian)
-
-    def _moves(self, unloaded: Equilibrium, loaded: Equilibrium) -> np.ndarray:
-        """(n, 3) of the rods' bodies."""
-        return loaded.state.positions[self._nodes] - unloaded.state.positions[self._nodes]
 
     def _allowed(
         self, unloaded: Equilibrium, sensitivities: Sensitivities | None = None

@@ -67,7 +67,9 @@ def test_weights_by_name():
     weights = Weights.of({"energy": 0.1, "stress": 2.0})
     assert weights.to_dict() == {"fit": 1e4, "energy": 0.1, "share": 0.1, "stress": 2.0}
     assert Weights.of(weights.to_dict()) == weights
-    with pytest.raises(InputError, match="weights = 'beauty'.*known: fit, energy, stress"):
+    with pytest.raises(
+        InputError, match="weights = 'beauty'.*known: fit, energy, deflection, stress"
+    ):
         Weights.of({"beauty": 1.0})
     with pytest.raises(InputError, match=r"weights\.stress.*nan"):
         Weights.of({"stress": float("nan")})
