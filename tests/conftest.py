@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+from functools import partial
 from pathlib import Path
 
 import hypothesis
@@ -13,6 +14,8 @@ import pytest
 from kop_exudyn.compiled.library import OFF, library
 from kop_exudyn.fabrication.pieces import parts_list
 from kop_exudyn.kit.cluster import cluster
+from kop_exudyn.report import kit_report
+from kop_exudyn.report.kit_picture import kit_pictures
 from kop_exudyn.structures.base import design_from_dict
 from kop_exudyn.structures.stacking import stacked_groups, stacked_parameters
 
@@ -32,6 +35,16 @@ def nothing_is_silenced():
     logger = logging.getLogger("kop_exudyn")
     logger.setLevel(logging.NOTSET)
     logger.propagate, logger.disabled = True, False
+
+
+@pytest.fixture(autouse=True, scope="session")
+def small_pictures():
+    """Reports draw a picture of every design; those of tests are small, since drawing a large one
+    takes longer than finding a toy's kit. Large ones are drawn by tests/report/test_kit_picture."""
+    with pytest.MonkeyPatch.context() as patch:
+        small = partial(kit_pictures, width=160, height=115)
+        patch.setattr(kit_report, "kit_pictures", small)
+        yield
 
 
 @pytest.fixture(scope="session")

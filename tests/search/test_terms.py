@@ -83,7 +83,7 @@ def coarse(repository, name):
 
 def test_more_weight_on_stress_lowers_it(repository):
     """And the kit is found with that term as with the others."""
-    designs = [coarse(repository, name) for name in ("01_dome", "03_enneper")]
+    designs = [coarse(repository, "03_enneper")]
     stresses = []
     for weight in (0.0, 0.3):
         settings = JobSettings(
@@ -99,7 +99,7 @@ def test_more_weight_on_stress_lowers_it(repository):
                 effort="quick",
             ),
         )
-        outcome = optimize_kit(designs, {"linear": 4, "angular": 3}, settings=settings)
+        outcome = optimize_kit(designs, {"linear": 3, "angular": 2}, settings=settings)
         judge = [
             DesignObjective(d, Weights(others=(("stress", 1.0),)), r)
             for d, r in zip(designs, outcome.references)

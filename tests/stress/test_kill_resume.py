@@ -21,34 +21,58 @@ from lib.stress.arch import arches
 from lib.stress.interruption import FailingStore, MemoryStore, fingerprint, resumed_at
 
 PARTS = {"linear": 2}
-SETTINGS = JobSettings(jobs=1, stages=StageSettings(schedule=(1e3, 1e5)))
+SCHEDULE = (1e3, 1e5)
+# From one start, with all stages; and from several, which the checkpoints of each begin anew.
+SETTINGS = JobSettings(jobs=1, stages=StageSettings(schedule=SCHEDULE, effort="quick"))
+SEVERAL_STARTS = JobSettings(jobs=1, stages=StageSettings(schedule=SCHEDULE))
+
+
+class Undisturbed:
+    """A job that nobody disturbs: its outcome and events, what it cost, and its checkpoints."""
+
+    def __init__(self, settings):
+        self.store, events = MemoryStore(), []
+        found = optimize_kit(
+            arches(), PARTS, settings=settings, store=self.store, observer=events.append
+        )
+        self.fingerprint = fingerprint(found, events)
+        self.cost = found.equilibria, found.newton_iterations
+        self.saves = self.store.saves
+        assert self.saves >= 8
+
+    def is_resumed(self, settings, at, after):
+        """Whether a job interrupted at a checkpoint, before it is kept or right after, ends like
+        this one; after it, nothing may be done again."""
+        outcome, events = resumed_at(at, arches(), PARTS, settings, after)
+        assert not after or (outcome.equilibria, outcome.newton_iterations) == self.cost
+        return fingerprint(outcome, events) == self.fingerprint
 
 
 @pytest.fixture(scope="module")
 def undisturbed():
-    """The outcome, the events and the number of checkpoints of a job that nobody disturbs."""
-    store, events = MemoryStore(), []
-    outcome = optimize_kit(arches(), PARTS, settings=SETTINGS, store=store, observer=events.append)
-    assert store.saves >= 8
-    return (
-        fingerprint(outcome, events),
-        (outcome.equilibria, outcome.newton_iterations),
-        store.saves,
-    )
+    return Undisturbed(SETTINGS)
 
 
-@pytest.mark.parametrize("after", [False, True])
-@pytest.mark.parametrize("at", [1, 2, 4, 7, -1])
+@pytest.fixture(scope="module")
+def of_several_starts():
+    found = Undisturbed(SEVERAL_STARTS)
+    assert sum(str(name).startswith("assigned-") for name in found.store.kept) >= 4
+    return found
+
+
+@pytest.mark.parametrize("at, after", [(1, True), (2, False), (4, True), (7, False), (-1, True)])
 def test_interrupted_at_a_checkpoint(undisturbed, at, after):
-    """Before it is kept, or right after."""
-    expected, cost, saves = undisturbed
-    outcome, events = resumed_at(at if at > 0 else saves, arches(), PARTS, SETTINGS, after)
-    assert fingerprint(outcome, events) == expected
-    if after:  # nothing had to be done again
-        assert (outcome.equilibria, outcome.newton_iterations) == cost
+    at = at if at > 0 else undisturbed.saves
+    assert undisturbed.is_resumed(SETTINGS, at, after)
 
 
-@pytest.mark.parametrize("batch", [1, 2, 3, 5, 8, 13, 21])
+@pytest.mark.parametrize("back, after", [(2, True)])
+def test_interrupted_between_starts(of_several_starts, back, after):
+    at = of_several_starts.saves - back
+    assert of_several_starts.is_resumed(SEVERAL_STARTS, at, after)
+
+
+@pytest.mark.parametrize("batch", [1, 2, 5, 13, 21])
 def test_interrupted_between_checkpoints(undisturbed, monkeypatch, batch):
     """In the middle of a step: while the batch-th lot of simulations is running."""
     store, events, batches = MemoryStore(), [], []
@@ -65,7 +89,7 @@ def test_interrupted_between_checkpoints(undisturbed, monkeypatch, batch):
     with pytest.raises(KeyboardInterrupt):
         optimize_kit(arches(), PARTS, settings=SETTINGS, store=store)
     outcome = optimize_kit(arches(), PARTS, settings=SETTINGS, store=store, observer=events.append)
-    assert fingerprint(outcome, events) == undisturbed[0]
+    assert fingerprint(outcome, events) == undisturbed.fingerprint
 
 
 def test_interrupted_again_and_again(undisturbed):
@@ -81,8 +105,8 @@ def test_interrupted_again_and_again(undisturbed):
             break
         except KeyboardInterrupt:
             continue
-    assert runs == undisturbed[2] + 1
-    assert fingerprint(outcome, events) == undisturbed[0]
+    assert runs == undisturbed.saves + 1
+    assert fingerprint(outcome, events) == undisturbed.fingerprint
 
 
 @pytest.mark.parametrize(
@@ -96,17 +120,17 @@ def test_interrupted_again_and_again(undisturbed):
         lambda arrays: arrays.update({"states/0/deployed/numbers": np.zeros(2)}),
     ],
 )
-def test_a_checkpoint_of_something_else(damage):
+def test_a_checkpoint_of_something_else(undisturbed, damage):
     store = MemoryStore()
-    optimize_kit(arches(), PARTS, settings=SETTINGS, store=store)
-    before = {name: dict(arrays) for name, arrays in store.kept.items()}
+    store.kept = {name: dict(arrays) for name, arrays in undisturbed.store.kept.items()}
+    before = set(store.kept)
     damage(store.kept["relaxed-1000"])
     if "0/deployed/numbers" in store.kept["relaxed-1000"]:  # an array too many harms nobody
         optimize_kit(arches(), PARTS, settings=SETTINGS, store=store)
         return
     with pytest.raises(InputError, match="checkpoint 'relaxed-1000' is damaged: start anew"):
         optimize_kit(arches(), PARTS, settings=SETTINGS, store=store)
-    assert store.kept.keys() == before.keys()
+    assert store.kept.keys() == before
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +142,7 @@ def good(tmp_path_factory):
 
 
 class TestFullDisk:
-    @pytest.mark.parametrize("write", [1, 3, 6, 11])
+    @pytest.mark.parametrize("write", [1, 6, 11])
     def test_the_run_ends_cleanly_and_goes_on_later(self, tmp_path, monkeypatch, good, write):
         """No space left at the write-th file: one line, the files before it whole, none half
         written, then resumed."""
@@ -163,7 +187,7 @@ def test_what_a_kill_while_writing_leaves_is_cleaned_up(tmp_path, good):
 def test_killed_processes(tmp_path):
     """SIGKILL to the command line, wherever it is; no step that a checkpoint held is ever lost."""
     designs = kills.write_designs(tmp_path / "designs")
-    kills.finish(kills.start(designs, tmp_path / "good"))
-    hits, kept = kills.killed_and_resumed(designs, tmp_path / "killed", (0.0, 0.3, 0.7))
-    assert hits >= 2 and kept == sorted(kept)
+    kills.finish(kills.start(designs, tmp_path / "good", "quick"))
+    hits, kept = kills.killed_and_resumed(designs, tmp_path / "killed", (0.0, 0.3), "quick")
+    assert hits == 2 and kept == sorted(kept)
     assert kills.outcome(tmp_path / "killed") == kills.outcome(tmp_path / "good")

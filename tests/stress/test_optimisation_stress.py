@@ -24,7 +24,9 @@ SCHEDULE = (1e3, 1e5)
 
 
 def run(designs, parts, kit=None, **stages):
-    settings = JobSettings(jobs=1, stages=StageSettings(**({"schedule": SCHEDULE} | stages)))
+    """The kit of a job with one start, unless `stages` ask for more."""
+    own = {"schedule": SCHEDULE, "effort": "quick"} | stages
+    settings = JobSettings(jobs=1, stages=StageSettings(**own))
     return optimize_kit(
         designs,
         {"linear": parts} if kit is None else None,
@@ -89,7 +91,7 @@ def test_elements_that_repeat_and_parts_to_spare(designs, parts):
 
 def test_one_part_for_all():
     designs = arches()
-    outcome = run(designs, 1)
+    outcome = run(designs, 1, effort="normal")
     check(outcome, designs)
     assert len(outcome.stages["assigned"].kit["linear"]) == 1
     assert outcome.stages["assigned"].value < outcome.stages["direct"].value
@@ -178,7 +180,9 @@ class TestWorkers:
         designs = arches(3)
         settings = JobSettings(
             jobs=2,
-            stages=StageSettings(schedule=(1e3,), relaxed_steps=2, assigned_steps=2, path_steps=3),
+            stages=StageSettings(
+                schedule=(1e3,), relaxed_steps=2, assigned_steps=2, path_steps=3, effort="quick"
+            ),
         )
         undisturbed = fingerprint(optimize_kit(designs, {"linear": 2}, settings=settings))
         monkeypatch.setattr(pool, "_run_task", _slow_task)

@@ -35,7 +35,7 @@ def write_designs(folder: Path, count: int = 2, joints: int = 6) -> Path:
     return folder
 
 
-def start(designs: Path, out: Path, jobs: int = 1, parts: str = "linear=2") -> subprocess.Popen:
+def start(designs: Path, out: Path, effort: str = "normal") -> subprocess.Popen:
     """`kop optimize DESIGNS --resume --out OUT` in a process of its own."""
     return subprocess.Popen(
         [
@@ -45,11 +45,13 @@ def start(designs: Path, out: Path, jobs: int = 1, parts: str = "linear=2") -> s
             "optimize",
             str(designs),
             "--parts",
-            parts,
+            "linear=2",
             "--out",
             str(out),
             "--jobs",
-            str(jobs),
+            "1",
+            "--effort",
+            effort,
             "--resume",
             "-q",
         ],
@@ -107,18 +109,20 @@ def steps_kept(out: Path) -> int:
     )
 
 
-def killed_and_resumed(designs: Path, out: Path, delays: Sequence[float]) -> tuple[int, list[int]]:
+def killed_and_resumed(
+    designs: Path, out: Path, delays: Sequence[float], effort: str = "normal"
+) -> tuple[int, list[int]]:
     """Kill the run after each of these delays, resuming in between, then let it finish.
 
     Returns how many kills hit a running process, and the steps in the checkpoints after each.
     """
     hits, kept = 0, []
     for delay in delays:
-        if not kill_after(start(designs, out), out, delay):
+        if not kill_after(start(designs, out, effort), out, delay):
             break
         hits += 1
         kept.append(steps_kept(out))
-    finish(start(designs, out))
+    finish(start(designs, out, effort))
     return hits, kept
 
 
