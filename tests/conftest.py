@@ -27,6 +27,32 @@ hypothesis.settings.load_profile("unhurried")
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 
+# Files of tests that take longest by themselves come first, so that several processes, each of
+# which takes a whole file at a time, end together.
+LONG = (
+    "docs/test_tutorial.py",
+    "studies/test_quick_studies.py",
+    "stress/test_kill_resume.py",
+    "studies/test_stress.py",
+    "stress/test_optimisation_stress.py",
+    "studies/test_benchmark.py",
+    "docs/test_notebooks.py",
+    "studies/test_quick_kits_of_classes.py",
+)
+
+
+def pytest_configure(config):
+    if hasattr(config.option, "loadscopereorder"):  # of pytest-xdist: most tests first
+        config.option.loadscopereorder = False
+
+
+def pytest_collection_modifyitems(items):
+    def place(item):
+        name = "/".join(item.path.parts[-2:])
+        return LONG.index(name) if name in LONG else len(LONG)
+
+    items.sort(key=place)
+
 
 @pytest.fixture(autouse=True)
 def nothing_is_silenced():
