@@ -28,7 +28,7 @@ DESCRIPTION = """Writes a design file from
   in a plane. Pieces that go on in each other become one curve; ends that meet and are of the two different families
   are hinged.
 
-  a surface (with --patch; a mesh: .obj, .ply, .stl, or .json of COMPAS): an umbrella mesh in the shape of its middle,
+  a surface (with --patch; a mesh: .obj, .ply, .stl, .off, or .json of COMPAS): an umbrella mesh in the shape of its middle,
   in millimetres, the arms as long as the cells have to grow.
 
   an umbrella mesh in the format of its public release (.json or .json.gz): the same mesh, in millimetres. Such files
@@ -62,7 +62,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FILE",
         help="drawing (.obj, .dxf, .3dm), surface (.obj, .ply, .stl, "
-        ".json) or released umbrella mesh (.json, .json.gz)",
+        ".off, .json) or released umbrella mesh (.json, .json.gz)",
     )
     parser.add_argument("--out", type=Path, metavar="DESIGN", help="design file to write (.json)")
     parser.add_argument(
@@ -165,6 +165,16 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "where they turn by less than 45 degrees, or never (default: %(default)s)",
     )
     shell.add_argument(
+        "--largest-part",
+        action="store_true",
+        help="leave out what isn't connected with most of the curves: frames, legends, other nets",
+    )
+    shell.add_argument(
+        "--edges",
+        action="store_true",
+        help="of a mesh (.obj, COMPAS .json) or a COMPAS graph: its edges are the curves",
+    )
+    shell.add_argument(
         "--tolerance",
         type=positive_number,
         metavar="SHARE",
@@ -218,6 +228,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from ..errors import InputError
     from ..exchange.curve_files import CURVE_READERS, is_drawing
+    from ..exchange.other_formats import instead_of
     from ..files.files import check_output_file
     from ..geometry.mesh_files import MESH_SUFFIXES
 
@@ -225,12 +236,13 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("is a folder, expected a file", source=args.file)
     known = sorted({*CURVE_READERS, *MESH_SUFFIXES, ".json.gz"})
     if not args.file.name.lower().endswith(tuple(known)):
-        raise InputError(f"can't be imported (known: {', '.join(known)})", source=args.file)
+        how = instead_of(args.file.name)
+        raise InputError(f"can't be imported{how} (known: {', '.join(known)})", source=args.file)
     if args.out is None and args.preview is None:
         raise InputError("nothing to do: give --out, --preview or both", source=args.file)
     for path in filter(None, (args.out, args.preview)):
         check_output_file(path, overwrite=args.overwrite)
-    drawn = is_drawing(args.file)
+    drawn = is_drawing(args.file) or args.edges
     wanted = args.kind or ("c_shell" if drawn and args.patch is None else None)
     lacks_patch = drawn and wanted == "umbrella" and args.patch is None  # is said below
     for option, classes in () if lacks_patch else _OF_CLASSES.items():
@@ -255,6 +267,7 @@ def _drawing(args: argparse.Namespace, wanted: str) -> int:
     """A C-shell or a grid of a drawn net; its preview also where no design comes of it."""
     from ..errors import InputError
     from ..exchange.imports import read_scaled
+    from ..exchange.space_nets import with_heights_checked
     from ..units import Units
 
     if args.out is not None:
@@ -266,6 +279,8 @@ def _drawing(args: argparse.Namespace, wanted: str) -> int:
     try:
         made = None if args.out is None else _made(args, wanted, drawn, units)
         drawn.network  # which says what is wrong with it
+        if made is None and not drawn.frame.flat and args.surface is None:
+            drawn = with_heights_checked(drawn)
     except InputError as error:
         error = error.at(args.file)
         if args.preview is not None:
@@ -314,6 +329,8 @@ def _reading(args: argparse.Namespace) -> ReadingOptions:
         free_ends=args.free_ends,
         join=args.join,
         tolerance=TOLERANCE if args.tolerance is None else args.tolerance,
+        largest_part=args.largest_part,
+        edges=args.edges,
     )
 
 

@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 from .drawing import DrawnCurve, Finding
 
 TOLERANCE = 2e-4  # of the drawing's size
+_TOLD = 3  # findings of a kind that are told one by one
 _ROUND_OFF = 1e-9  # of the size: less is not worth a word
 
 
@@ -49,7 +50,7 @@ def cleaned(
 def _in_sum(findings: Sequence[Finding]) -> list[Finding]:
     """The same, those of many curves in one."""
     points = [f for f in findings if f.kind == "cleaned"]
-    if len(points) <= 3:
+    if len(points) <= _TOLD:
         return list(findings)
     total = sum(int(f.text.split()[0]) for f in points)
     text = f"{total} repeated points left out of {len(points)} curves"
@@ -77,7 +78,7 @@ def _without_repetitions(curve: DrawnCurve, tolerance: float) -> DrawnCurve | No
         points, closed = points[:-1], True
     if closed and len(points) < 3:
         closed = False
-    return DrawnCurve(points, closed, curve.label)
+    return DrawnCurve(points, closed, curve.label, curve.layer)
 
 
 def _without_doubles(
@@ -110,6 +111,9 @@ def _without_doubles(
         )
         for k, other in sorted(gone.items())
     ]
+    if len(found) > _TOLD:
+        text = f"{len(found)} curves lie on others and are left out: {found[0].text[:-16]}, say"
+        found = [Finding("cleaned", text, np.concatenate([f.places for f in found]))]
     return [curve for k, curve in enumerate(curves) if k not in gone], found
 
 

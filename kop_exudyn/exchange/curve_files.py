@@ -14,6 +14,7 @@ from ..geometry.nurbs import spline_points
 from ..geometry.obj_files import ObjContent, parse_obj
 from .drawing import SAG, Drawing, DrawnCurve
 from .dxf_curves import dxf_drawing
+from .other_formats import is_really
 from .rhino_curves import rhino_drawing
 
 _SIZE_LIMIT = 64 * 2**20  # bytes: nets have some thousand points
@@ -43,6 +44,9 @@ def read_drawing(path: str | Path, layers: Sequence[str] = ()) -> Drawing:
             "only DXF and 3dm files have layers", source=path, field="layer", value=layers[0]
         )
     content = read_bytes(path, _SIZE_LIMIT)
+    other = is_really(content)
+    if other is not None:
+        raise InputError(other, source=path)
     try:
         drawing = CURVE_READERS[suffix](content, layers)
     except InputError as error:
@@ -70,7 +74,7 @@ def _obj_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
     curves += _free_forms(found)
     skipped = [f"{n} {name} elements" for name, n in found.left_out.items()]
     if found.faces:
-        skipped.append(f"{len(found.faces)} faces, which are a surface's")
+        skipped.append(f"{len(found.faces)} faces, which are a surface's: --edges reads them")
     return Drawing(curves, skipped=skipped)
 
 

@@ -18,11 +18,13 @@ class DrawnCurve:
     points (n, 3) : at least two, in order
     closed : whether the last one is joined to the first
     label : what messages call it, as "line 12" or "SPLINE 2F"
+    layer : that it is on, where the file has layers
     """
 
     points: np.ndarray
     closed: bool
     label: str
+    layer: str | None = None
 
 
 @dataclass(frozen=True)

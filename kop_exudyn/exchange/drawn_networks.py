@@ -17,15 +17,19 @@ from ..geometry.centring import middle_of
 from ..geometry.curves import Curve, curve_from_dict
 from ..geometry.network import CurveNetwork, network
 from .cleaning import TOLERANCE, cleaned
-from .contacts import crossing_pieces, end_contacts
+from .contacts import EndContact, crossing_pieces, end_contacts
 from .curve_files import read_drawing
 from .drawing import Drawing, DrawnCurve, Finding, size_of
 from .frames import Frame, frame_of
 from .joins import join_ends
+from .overlaps import without_overlaps
+from .parts import advice, largest_part
+from .strips import axes_of_strips, sides_of_laths
 from .suspicions import (
     narrow_loops,
     refuse_stray_heights,
     refuse_strays,
+    refuse_upright,
     rounded_corners,
     without_bolts,
 )
@@ -35,7 +39,12 @@ _DIGITS = 9  # of the size, that points are written with
 _SUSPICIOUS = (
     20.0  # times the tolerance: ends that stop so near to another curve may be meant on it
 )
-_WHOLE_SPAN = 0.3  # of the median span: longer free ends look like a joint was missed
+_CROWDED = "a joint holds two laths, of which at most four ends meet"
+_IN_SPACE = (
+    "the net is drawn in space and read as a height field, seen along {}: where it hangs over, "
+    "turn it, or give its --surface with --chart conformal"
+)
+_APART = ("crosses no other curve", "is not connected", "nothing is left", "at least 3 joints")
 
 
 @dataclass(frozen=True)
@@ -48,6 +57,8 @@ class ReadingOptions:
     free_ends : whether rods go on beyond their last joint
     join : "auto", "always" or "never", see `join_ends`
     tolerance : share of the drawing's size, see `cleaned`
+    largest_part : whether curves that aren't connected with the largest part are left out
+    edges : whether the edges of a mesh, or graph, are the curves
     """
 
     layers: Sequence[str] = ()
@@ -56,6 +67,8 @@ class ReadingOptions:
     free_ends: bool = False
     join: str = "auto"
     tolerance: float = TOLERANCE
+    largest_part: bool = False
+    edges: bool = False
 
 
 @dataclass(frozen=True)
@@ -98,7 +111,12 @@ class DrawnNetwork:
         try:
             return network(self._curves(), free_ends=self.options.free_ends, acute=True)
         except InputError as error:
-            raise self.named(error) from None
+            named = self.named(error)
+            more = self._crowded() or self._short_of(named.field) or self._advice(named)
+            if more is None:
+                raise named from None
+            message = f"{named.message}. {more[0].upper()}{more[1:]}"
+            raise InputError(message, field=named.field, value=named.value) from None
 
     def named(self, error: InputError) -> InputError:
         """An error about a design with the curves named as in the drawing."""
@@ -114,6 +132,33 @@ class DrawnNetwork:
         return InputError(
             renamed(error.message), source=error.source, field=field, value=error.value
         )
+
+    @property
+    def _across(self) -> int:
+        """The axis that a net in space is seen along."""
+        return int(np.argmax(np.abs(self.frame.axes[2])))
+
+    def _crowded(self) -> str | None:
+        """What was said of places where too many curves end."""
+        return next((f.text for f in self.findings if f.text.endswith(_CROWDED)), None)
+
+    def _short_of(self, label: str | None) -> str | None:
+        """What was said of a curve that stops a little short of others, or the other way round."""
+        return next(
+            (
+                f.text
+                for f in self.findings
+                if f.text.startswith(f"{label} ends ") or f" short of {label}: " in f.text
+            ),
+            None,
+        )
+
+    def _advice(self, error: InputError) -> str | None:
+        """What to do where the drawing falls into parts, or is in space."""
+        if not any(words in error.message for words in _APART):
+            return None if self.frame.flat else _IN_SPACE.format("xyz"[self._across])
+        flat = [self.frame(curve.points)[:, :2] for curve in self.curves]
+        return advice(self.curves, flat, self.options.tolerance * size_of(self.curves))
 
     def _curves(self) -> list[Curve]:
         return [curve_from_dict(e, f"curves[{k}]") for k, e in enumerate(self.entries)]
@@ -167,9 +212,18 @@ def drawn_network(
     if frame.flat and not frame.standard:
         where = f"turned by {np.degrees(frame.tilt):.3g}° against the xy plane"
         findings.append(Finding("cleaned", f"the drawing's plane, {where}, is laid flat"))
+    curves, overlaps = without_overlaps(curves, tolerance)
     flat = [frame(curve.points)[:, :2] for curve in curves]
+    refuse_upright(curves, flat, tolerance)
+    strips: list[Finding] = []
+    if frame.flat:
+        curves, flat, strips = axes_of_strips(curves, flat, tolerance)
     curves, flat, bolts = without_bolts(curves, flat, size)
-    done += [*bolts, *narrow_loops(curves, flat)]
+    done += [*overlaps, *strips, *bolts, *narrow_loops(curves, flat)]
+    if options.largest_part:
+        curves, flat, others = largest_part(curves, flat, tolerance)
+        done += others
+    done += sides_of_laths(curves, flat, tolerance)
     joined = join_ends(
         curves, crossing_pieces(curves, flat, tolerance, size), tolerance, options.join
     )
@@ -212,6 +266,13 @@ def _about_joins(joined: Any) -> list[Finding]:
             "has a corner: the turn alone decided (--join always or never decides otherwise)"
         )
         found.append(Finding("suspicious", text, joined.by_turn))
+    if len(joined.crowded):
+        x, y, z = joined.crowded[0]
+        text = (
+            f"more than four ends of curves meet at {len(joined.crowded)} places, such as "
+            f"({x:.6g}, {y:.6g}, {z:.6g}): {_CROWDED}"
+        )
+        found.append(Finding("suspicious", text, joined.crowded))
     if not joined.families:
         text = (
             "the curves don't fall into two families that cross only each other: they brace each "
@@ -252,30 +313,21 @@ def _ends_on_curves(
     if moved:
         text = f"{len(moved)} ends brought onto the curves beside them, by {largest:.3g} at most"
         found.append(Finding("cleaned", text, np.array(moved)))
-    found += _missed(curves, flat, frame, [c for c in near if (c.curve, c.end) not in reached])
+    found += _missed(curves, [c for c in near if (c.curve, c.end) not in reached])
     return [replace(curve, points=x) for curve, x in zip(curves, points)], found
 
 
-def _missed(
-    curves: Sequence[DrawnCurve], flat: Sequence[Curve], frame: Frame, near: Sequence[Any]
-) -> list[Finding]:
-    """Ends whose last joint is far back, and that stop a little short of another curve."""
-    found = []
-    for contact in near:
-        end = curves[contact.curve].points[contact.end]
-        tail = flat[contact.curve].length * _WHOLE_SPAN / max(len(flat) / 4, 1)
-        others = [
-            c
-            for c in end_contacts([flat[contact.curve], flat[contact.other]], 0.0)
-            if c.curve == 0 and c.end == contact.end and c.beyond <= tail
-        ]
-        if not others:
-            text = (
-                f"{curves[contact.curve].label} ends {-contact.beyond:.3g} short of "
-                f"{curves[contact.other].label}: a joint may be meant (--tolerance)"
-            )
-            found.append(Finding("suspicious", text, end[None]))
-    return found
+def _missed(curves: Sequence[DrawnCurve], near: Sequence[EndContact]) -> list[Finding]:
+    """Ends that stop a little short of another curve."""
+    return [
+        Finding(
+            "suspicious",
+            f"{curves[contact.curve].label} ends {-contact.beyond:.3g} short of "
+            f"{curves[contact.other].label}: a joint may be meant (--tolerance)",
+            curves[contact.curve].points[contact.end][None],
+        )
+        for contact in near
+    ]
 
 
 def network_summary(found: CurveNetwork) -> Mapping[str, Any]:

@@ -19,10 +19,12 @@ import numpy as np
 from ..errors import InputError
 from ..fabrication.dxf import load_ezdxf
 from .drawing import Drawing
+from .dxf_clips import Clip, clip_of, shown
 from .dxf_outlines import outline_of
+from .dxf_repair import with_classes
 from .outlines import flattened
 
-_DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE", "SPLINE", "ARC", "CIRCLE", "ELLIPSE")
+_DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE", "SPLINE", "ARC", "CIRCLE", "ELLIPSE", "MLINE")
 _BINARY = b"AutoCAD Binary DXF"
 _DEEPEST = 20  # blocks within blocks
 _MOST_ENTITIES = 200_000
@@ -53,6 +55,7 @@ _UNITS = {
     23: ("US survey yards", 3600 / 3937),
     24: ("US survey miles", 5280 * 1200 / 3937),
 }
+_IMPERIAL = {1, 2, 3, 8, 9, 10}
 # what the names of codes begin with, under which entities are left out as damaged
 _LOST = ("REMOVED_INVALID_GRAPHIC", "REMOVED_ENTITY", "UNDEFINED_BLOCK", "INVALID_SPLINE")
 _END = re.compile(rb"EOF\s*\0?\s*$")
@@ -66,6 +69,7 @@ class _Placed:
     layer : that it is seen on
     label : what messages call it
     invisible : whether it, or a block that it is of, is hidden
+    clips : of the blocks that it is of
     """
 
     entity: Any
@@ -73,6 +77,7 @@ class _Placed:
     layer: str
     label: str
     invisible: bool
+    clips: tuple[Clip, ...] = ()
 
 
 def dxf_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
@@ -108,7 +113,11 @@ def dxf_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
         elif e.entity.dxftype() not in _DRAWN or _is_mesh(e.entity):
             others[e.entity.dxftype() + (" mesh" if _is_mesh(e.entity) else "")] += 1
         else:
-            drawn.append((outline_of(e.entity, e.label, e.matrix), e.label))
+            outline = outline_of(e.entity, e.label, e.matrix)
+            if outline is None or shown(outline, e.clips, e.label):
+                drawn.append((outline, e))
+            else:
+                unseen[f"outside the clip (XCLIP) of block {e.clips[-1].block}"] += 1
     skipped = [f"{n} {what}" for what, n in unseen.items()]
     skipped += [
         f"{n} insertions of {name}, a block of another file: bind it to this one, or import that "
@@ -122,17 +131,27 @@ def dxf_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
         skipped.append(f"{empty} curves of a single point")
     if not _END.search(content):
         doubts.append("the file has no end (EOF): it may be cut off, and curves missing")
+    if not entities:
+        skipped += _on_paper(document)
     code = document.header.get("$INSUNITS", 0)
     name, metres = _UNITS.get(code, (None, None))
     if name is None and code != 0:
         doubts.append(f"its unit of length has the number {code}, which isn't known: give --scale")
-    outlines = [(outline, label) for outline, label in drawn if outline is not None]
+    if code in _IMPERIAL and document.header.get("$MEASUREMENT") == 1:
+        doubts.append(
+            f"its unit of length ($INSUNITS) is {name}, but its system ($MEASUREMENT) is metric: "
+            "if its numbers are mm, say, give --scale and --unit"
+        )
+    outlines = [
+        (replace(outline, layer=e.layer), e.label) for outline, e in drawn if outline is not None
+    ]
     return Drawing(list(flattened(outlines)), name, metres, skipped, doubts)
 
 
 def _document(ezdxf: Any, content: bytes) -> tuple[Any, list[str]]:
     """The document, and in words what was left out of it as damaged."""
     from ezdxf.audit import AuditError
+    from ezdxf.lldxf.const import DXFStructureError
 
     try:
         if content.startswith(_BINARY):
@@ -146,7 +165,12 @@ def _document(ezdxf: Any, content: bytes) -> tuple[Any, list[str]]:
 
             if b"\n" not in content:  # lines as old Macintosh programs end them
                 content = content.replace(b"\r", b"\n")
-            document, auditor = recover.read(io.BytesIO(content))
+            try:
+                document, auditor = recover.read(io.BytesIO(content))
+            except DXFStructureError as error:
+                if "subclass" not in str(error):
+                    raise
+                document, auditor = recover.read(io.BytesIO(with_classes(content)))
     except Exception as error:  # its readers raise whatever the broken file leads them to
         raise InputError(f"can't be read as DXF: {str(error)[:100]}") from None
     if auditor.has_errors:
@@ -155,6 +179,16 @@ def _document(ezdxf: Any, content: bytes) -> tuple[Any, list[str]]:
     if not lost:
         return document, []
     return document, [f"{len(lost)} damaged entities are left out: {lost[0].rstrip('.')}"]
+
+
+def _on_paper(document: Any) -> list[str]:
+    """What is drawn on sheets, in words."""
+    counts = {layout.name: len(layout) for layout in document.layouts if not layout.is_modelspace}
+    return [
+        f"{n} entities on the sheet {name}: draw the net in model space, at its own size"
+        for name, n in counts.items()
+        if n
+    ]
 
 
 def _hidden_layers(document: Any) -> set[str]:
@@ -199,6 +233,7 @@ def _exploded(
             outer.layer if outer is not None and of_outer else own,
             f"{entity.dxftype()} {entity.dxf.handle or count[0]}{within}",
             bool(entity.dxf.get("invisible", 0)) or outer is not None and outer.invisible,
+            () if outer is None else outer.clips,
         )
         if entity.dxftype() != "INSERT" or _elsewhere(entity):
             yield placed
@@ -209,7 +244,9 @@ def _exploded(
         for single in entity.multi_insert() if entity.mcount > 1 else (entity,):
             matrix = single.matrix44()
             matrix = matrix if placed.matrix is None else matrix * placed.matrix
-            inner = replace(placed, matrix=matrix)
+            clip = clip_of(single, placed.matrix)
+            clips = placed.clips if clip is None else (*placed.clips, clip)
+            inner = replace(placed, matrix=matrix, clips=clips)
             yield from _exploded(entity.block(), frozen, inner, name, depth + 1, count)
 
 

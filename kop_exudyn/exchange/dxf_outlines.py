@@ -22,8 +22,8 @@ def outline_of(entity: Any, label: str, matrix: Any = None) -> Outline | None:
     matrix : of ezdxf, the affine map of the block that it is of into the drawing
     """
     try:
-        is_spline = entity.dxftype() == "SPLINE"
-        outline = _spline(entity, matrix) if is_spline else _path(entity, matrix)
+        read = {"SPLINE": _spline, "MLINE": _middle}.get(entity.dxftype(), _path)
+        outline = read(entity, matrix)
     except InputError as error:
         raise InputError(error.message, field=f"{label}{_begin(entity)}") from None
     except Exception as error:
@@ -52,6 +52,19 @@ def _path(entity: Any, matrix: Any) -> Outline:
     if path.has_curves:
         return Outline(corners, lambda sag: _points(path.flattening(sag)), path.is_closed)
     return Outline(corners, lambda sag: corners, path.is_closed)
+
+
+def _middle(entity: Any, matrix: Any) -> Outline:
+    """The middle of a multiline's outermost lines, which a lath of some width is drawn with."""
+    points = []
+    for vertex in entity.vertices:
+        offsets = [line[0] for line in vertex.line_params if len(line)]
+        middle = 0.5 * (min(offsets) + max(offsets)) if offsets else 0.0
+        points.append(vertex.location + vertex.miter_direction * middle)
+    corners = _points(points if matrix is None else matrix.transform_vertices(points))
+    closed = bool(entity.is_closed) and len(corners) > 2
+    corners = np.concatenate([corners, corners[:1]]) if closed else corners
+    return Outline(corners, lambda sag: corners, closed)
 
 
 def _spline(entity: Any, matrix: Any) -> Outline:

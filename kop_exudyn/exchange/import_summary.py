@@ -41,7 +41,8 @@ def import_rows(
 
     opening : rad, of a C-shell
     """
-    rows = [("curves", f"{figures['curves']} of {figures['pieces']} drawn pieces")]
+    of = "of" if figures["curves"] <= figures["pieces"] else "made of"
+    rows = [("curves", f"{figures['curves']} {of} {figures['pieces']} drawn pieces")]
     if "joints" in figures:
         rows.append(("joints", str(figures["joints"])))
         if figures["spans"]:

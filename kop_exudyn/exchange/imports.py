@@ -17,11 +17,13 @@ from ..structures.base import design_from_dict
 from ..units import LENGTHS, Units
 from .curve_files import read_drawing
 from .design_data import Rods, c_shell_data, grid_data, mesh_target, rod_doubts
-from .drawing import Drawing, Finding
+from .drawing import Drawing, Finding, size_of
 from .drawn_networks import DrawnNetwork, ReadingOptions, drawn_network
 from .frames import Frame
+from .mesh_edges import edges_of
 from .space_nets import laid_flat, surface_through, with_heights_checked
 
+_SMALLEST, _LARGEST = 0.02, 300.0  # m: nets that are built are of a size between
 _ON_SURFACE = 0.01  # of a mesh's size: curves drawn in space on it may be that far off
 
 
@@ -68,12 +70,27 @@ def read_scaled(
     space: bool = False,
 ) -> tuple[DrawnNetwork, Units | None]:
     """The network of a drawing in the design's units, see `scaled_reading` and `read_network`."""
-    drawing = read_drawing(path, options.layers)
+    drawing = edges_of(path) if options.edges else read_drawing(path, options.layers)
     options, units = scaled_reading(drawing, options, scale, units)
     try:
-        return drawn_network(drawing, options, space=space), units
+        drawn = drawn_network(drawing, options, space=space)
     except InputError as error:
         raise error.at(path) from None
+    return replace(drawn, findings=drawn.findings + _size_doubts(drawn, units)), units
+
+
+def _size_doubts(drawn: DrawnNetwork, units: Units | None) -> list[Finding]:
+    """A finding where a net is as small, or as large, as none is built."""
+    if units is None:
+        return []
+    size = drawn.options.scale * size_of(drawn.curves)
+    if _SMALLEST <= size * units.metres <= _LARGEST:
+        return []
+    text = (
+        f"the net is {size:.3g} {units.length} large: is this its unit? (--unit names the right "
+        "one, with --scale for the drawing's numbers)"
+    )
+    return [Finding("suspicious", text)]
 
 
 def import_c_shell(

@@ -46,6 +46,7 @@ class Joined:
     curves : in the order of their first pieces
     seams, tips (n, 3) : where pieces were joined, and where ends that meet stay two curves
     by_turn : places of seams and tips that only a middling turn decided, and of seams with a corner
+    crowded : places where more than four ends meet, which are left as they are
     families : whether the pieces fall into two families
     """
 
@@ -53,6 +54,7 @@ class Joined:
     seams: np.ndarray
     tips: np.ndarray
     by_turn: np.ndarray
+    crowded: np.ndarray
     families: bool
 
 
@@ -81,6 +83,7 @@ def join_ends(
             ("seams", [a for a, b in links.items() if a < b]),
             ("tips", decided.tips()),
             ("by_turn", decided.unsure),
+            ("crowded", [decided.ends[group[0]] for group in decided.groups if len(group) > 4]),
         )
     }
     return Joined(_chained(curves, links), **places, families=not decided.families.mixed)
@@ -305,4 +308,4 @@ def _put_together(
     points = np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
     closed = chain[0] in links  # the end where it began goes on as well
     label = first.label if len(chain) == 1 else f"{first.label} and {len(chain) - 1} more"
-    return DrawnCurve(points[:-1] if closed else points, closed, label)
+    return DrawnCurve(points[:-1] if closed else points, closed, label, first.layer)

@@ -14,11 +14,15 @@ from .drawing import SAG, DrawnCurve
 @dataclass(frozen=True)
 class Outline:
     """What an entity draws: corners (n, 3) of lines and Bezier curves, or control points, which
-    tell its size; and points on it within a sag."""
+    tell its size; and points on it within a sag.
+
+    layer : that it is seen on
+    """
 
     corners: np.ndarray
     points: Callable[[float], np.ndarray]
     closed: bool = False
+    layer: str | None = None
 
 
 def flattened(outlines: Sequence[tuple[Outline, str]]) -> Iterator[DrawnCurve]:
@@ -33,7 +37,7 @@ def flattened(outlines: Sequence[tuple[Outline, str]]) -> Iterator[DrawnCurve]:
         kind, _, within = label.partition(" ")
         block = f" {within.partition(' ')[2]}" if " " in within else ""
         name = f"{kind}{block} from {place_of(points[0])}"
-        yield DrawnCurve(points[: len(points) - closed], closed, name)
+        yield DrawnCurve(points[: len(points) - closed], closed, name, outline.layer)
 
 
 def place_of(point: Iterable[float]) -> str:

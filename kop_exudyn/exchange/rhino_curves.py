@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -115,7 +116,8 @@ class _Seen:
             self.others[type(geometry).__name__] += 1
             return
         label = f"curve {self._count}{within}"
-        yield self._outline(geometry, matrix, label), label
+        name = None if layer is None else layer.FullPath
+        yield replace(self._outline(geometry, matrix, label), layer=name), label
 
     def _block(
         self, reference: Any, matrix: np.ndarray, depth: int

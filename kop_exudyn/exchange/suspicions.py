@@ -11,12 +11,11 @@ import shapely
 
 from ..errors import InputError
 from .drawing import DrawnCurve, Finding
+from .strips import is_narrow
 
 # A loop around a place where two curves cross is a bolt's if it is nearly centred there, and so
 # small against the way to the next crossing, or, where there is none, against the drawing.
 _CENTRED, _SMALL, _SMALL_ALONE = 0.25, 0.2, 0.05
-# Four pi area / perimeter^2 is 1 for a circle, 0.14 for a rectangle of 20 to 1.
-_NARROW = 0.15
 _FEW = 0.1  # of the curves: fewer that leave the plane of the others are at a wrong height
 _ROUNDED = 0.1  # of a straight piece: how far a smooth curve may leave it; an octagon's does so
 
@@ -67,8 +66,7 @@ def narrow_loops(curves: Sequence[DrawnCurve], flat: Sequence[np.ndarray]) -> li
     for curve, points in zip(curves, flat):
         if not curve.closed:
             continue
-        polygon = shapely.Polygon(points)
-        if 4 * np.pi * polygon.area <= _NARROW * polygon.length**2:
+        if is_narrow(points):
             found.append(curve)
     if not found:
         return []
@@ -129,6 +127,25 @@ def refuse_stray_heights(curves: Sequence[DrawnCurve], tolerance: float) -> None
                 f"{len(curves)} curves lie in, by {off[worst]:.3g}",
                 field=curves[worst].label,
             )
+
+
+def refuse_upright(
+    curves: Sequence[DrawnCurve], flat: Sequence[np.ndarray], tolerance: float
+) -> None:
+    """Raise InputError, naming the curve and the place, where one goes straight up in the view
+    (flat, points (n, 2) of each) in which the net is read."""
+    for curve, points in zip(curves, flat):
+        steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        if not (steps <= tolerance).any():
+            continue
+        k = int(steps.argmin())
+        a, b = (f"({', '.join(f'{x:.6g}' for x in curve.points[n])})" for n in (k, k + 1))
+        raise InputError(
+            f"is seen as a point between {a} and {b}: nets in space are read as height fields, "
+            "along the axis that they lie across most. Turn the drawing, or leave upright pieces "
+            "out",
+            field=curve.label,
+        )
 
 
 def _departure(curve: DrawnCurve) -> tuple[float, float, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Triangle meshes from files: OBJ, PLY and STL, and the JSON files of COMPAS."""
+"""Triangle meshes from files: OBJ, PLY, STL and OFF, and the JSON files of COMPAS."""
 
 from __future__ import annotations
 
@@ -114,6 +114,10 @@ def _ply(content: bytes) -> Mesh:
     return _by_trimesh(content, "ply")
 
 
+def _off(content: bytes) -> Mesh:
+    return _by_trimesh(content, "off")
+
+
 def _by_trimesh(content: bytes, kind: str) -> Mesh:
     import trimesh
 
@@ -176,6 +180,7 @@ _READERS: dict[str, Callable[[bytes], Mesh]] = {
     ".obj": _obj,
     ".ply": _ply,
     ".stl": _stl,
+    ".off": _off,
     COMPAS: _compas,
 }
 MESH_SUFFIXES = tuple(_READERS)

@@ -251,7 +251,8 @@ def _strand(curve: Curve, own: Sequence[tuple[float, int]], free_ends: bool) -> 
         )
     if len(own) == 1 and not free_ends:
         raise InputError(
-            "nothing is left of a curve with one joint when its free ends are cut off",
+            "nothing is left of a curve with one joint when its free ends are cut off (free_ends "
+            "keeps them)",
             field=curve.field,
         )
     head, tail = (

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import ezdxf
@@ -16,6 +16,7 @@ import numpy as np
 from ezdxf import units
 from ezdxf.math import OCS, Matrix44
 
+_IMPERIAL = (units.IN, units.FT, units.MI, units.YD, 8, 9)
 NET = [((-0.2, k), (2.2, k)) for k in range(3)] + [((k, -0.2), (k, 2.2)) for k in range(3)]
 
 
@@ -63,6 +64,17 @@ def case(name: str, expected: Net | Refused) -> Callable:
     return add
 
 
+def size_doubts(metres: float) -> dict[str, int]:
+    """The findings of the net, of 3.4 units, where no net is of such a size."""
+    return {} if 0.02 < 3.4 * metres < 300 else {"suspicious": 1}
+
+
+def in_metres(metres: float) -> Net:
+    """The net in metres, of a file with another unit."""
+    net = Net(unit="m", length=12 * metres, options={"unit": "m"})
+    return replace(net, findings=size_doubts(metres))
+
+
 # -- DXF ------------------------------------------------------------------------------------------
 
 
@@ -72,6 +84,8 @@ def dxf(draw: Callable[[Any, Any], None], version: str = "R2010", unit: int | No
     document = ezdxf.new(version)
     if unit is not None:
         document.units = unit
+        if unit in _IMPERIAL:
+            document.header["$MEASUREMENT"] = 0
     elif version != "R12":
         document.header["$INSUNITS"] = 0
     draw(document, document.modelspace())
@@ -97,10 +111,10 @@ for _name, _code, _metres in (
     ("in", units.IN, 0.0254),
     ("ft", units.FT, 0.3048),
 ):
-    case(f"unit_{_name}.dxf", Net(unit=_name))(
+    case(f"unit_{_name}.dxf", Net(unit=_name, findings=size_doubts(_metres)))(
         lambda code=_code: dxf(lambda document, space: lines(space), unit=code)
     )
-    case(f"unit_{_name}_to_m.dxf", Net(unit="m", length=12 * _metres, options={"unit": "m"}))(
+    case(f"unit_{_name}_to_m.dxf", in_metres(_metres))(
         lambda code=_code: dxf(lambda document, space: lines(space), unit=code)
     )
 
@@ -110,7 +124,10 @@ def _decimetres() -> bytes:
     return dxf(lambda document, space: lines(space), unit=units.DM)
 
 
-@case("unit_mm_by_scale.dxf", Net(unit="m", length=0.012, options={"scale": 0.001}))
+@case(
+    "unit_mm_by_scale.dxf",
+    Net(unit="m", length=0.012, options={"scale": 0.001}, findings=size_doubts(1e-3)),
+)
 def _by_scale() -> bytes:
     return dxf(lambda document, space: lines(space), unit=units.MM)
 
@@ -408,7 +425,7 @@ def _paper() -> bytes:
     return dxf(draw)
 
 
-@case("paper_space_only.dxf", Refused("contains no curves"))
+@case("paper_space_only.dxf", Refused("entities on the sheet Layout1: draw the net in model"))
 def _paper_only() -> bytes:
     return dxf(lambda document, space: lines(document.paperspace()))
 
@@ -533,9 +550,9 @@ def _over() -> bytes:
     return dxf(lambda document, space: lines(space, [*NET, ((0, 1), (1, 1)), ((1, 1), (2, 1))]))
 
 
-@case("overlapping.dxf", Refused("touches"))
+@case("overlapping.dxf", Net(findings={"joined": 1, "suspicious": 1}))
 def _overlapping() -> bytes:
-    """Laths that lie on each other for a part of their way are a mistake of somebody's."""
+    """A lath of two lines that lie on each other for a part of their way."""
     net = [*NET[1:], ((-0.2, 0), (1.4, 0)), ((0.8, 0), (2.2, 0))]
     return dxf(lambda document, space: lines(space, net))
 
@@ -803,7 +820,10 @@ def _passing() -> str:
     return lower + upper
 
 
-@case("faces_only.obj", Refused("contains no curves (1 faces, which are a surface's)"))
+@case(
+    "faces_only.obj",
+    Refused("contains no curves (1 faces, which are a surface's: --edges reads them"),
+)
 def _faces() -> str:
     return "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 

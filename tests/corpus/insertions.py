@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from drawings import NET, Net, Refused, case, dxf, lines, noise
+from drawings import NET, Net, Refused, case, dxf, in_metres, lines, noise
 from splines import RADII, part_of_rings
 
 
@@ -202,7 +202,6 @@ def _others() -> bytes:
         lines(space)
         space.add_leader([(0.3, 0.3), (1.5, 0.6)])
         space.add_ray((0, 0), (1, 1))
-        space.add_mline([(0.3, 0.3), (1.5, 0.6)])
         space.add_solid([(0, 0), (1, 0), (0, 1)])
         with space.add_mesh().edit_data() as data:
             data.vertices, data.faces = [(0, 0, 0), (1, 0, 0), (1, 1, 0)], [(0, 1, 2)]
@@ -218,7 +217,7 @@ for _name, _code, _metres in (
     ("us_survey_inch", 22, 100 / 3937),
     ("us_survey_yard", 23, 3600 / 3937),
 ):
-    case(f"unit_{_name}.dxf", Net(unit="m", length=12 * _metres, options={"unit": "m"}))(
+    case(f"unit_{_name}.dxf", in_metres(_metres))(
         lambda code=_code: dxf(lambda document, space: lines(space), unit=code)
     )
 

@@ -5,6 +5,7 @@ import mesh_styles  # noqa: F401
 import misdrawn  # noqa: F401
 import obj_styles  # noqa: F401
 import rhino_files  # noqa: F401
+import sheets  # noqa: F401
 import splines  # noqa: F401
 from drawings import CASES, Net, Refused
 

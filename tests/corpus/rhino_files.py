@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from drawings import NET, Net, Refused, case
+from drawings import NET, Net, Refused, case, in_metres, size_doubts
 from splines import RADII, RINGS, spokes
 
 
@@ -55,10 +55,10 @@ def _lines() -> bytes:
 
 
 for _name, _unit, _metres in (("mm", "Millimeters", 1e-3), ("ft", "Feet", 0.3048)):
-    case(f"unit_{_name}.3dm", Net(unit=_name))(lambda unit=_unit: rhino(lines, unit))
-    case(f"unit_{_name}_to_m.3dm", Net(unit="m", length=12 * _metres, options={"unit": "m"}))(
+    case(f"unit_{_name}.3dm", Net(unit=_name, findings=size_doubts(_metres)))(
         lambda unit=_unit: rhino(lines, unit)
     )
+    case(f"unit_{_name}_to_m.3dm", in_metres(_metres))(lambda unit=_unit: rhino(lines, unit))
 
 
 @case("unit_unknown.3dm", Net(findings={"suspicious": 1}))

@@ -1,0 +1,138 @@
+"""Nets that are drawn as meshes or graphs: the edges of faces in OBJ files, of COMPAS meshes and
+graphs."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..checks import LARGEST
+from ..errors import InputError
+from ..files.files import read_bytes
+from ..geometry.obj_files import parse_obj
+from .drawing import Drawing, DrawnCurve
+
+EDGE_SUFFIXES = (".obj", ".json")
+_SIZE_LIMIT = 64 * 2**20  # bytes
+_MOST_EDGES = 20_000
+
+Edges = tuple[np.ndarray, list[tuple[int, int]]]
+
+
+def edges_of(path: Path) -> Drawing:
+    """Every edge of a file's faces, or of its graph, as a curve of its own: those that go on in
+    each other become one lath as pieces of a drawing do.
+
+    Raises InputError when the file can't be read, is too large, or has no edges.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in EDGE_SUFFIXES:
+        raise InputError(
+            f"edges are read of {' and '.join(EDGE_SUFFIXES)} files: save the mesh as OBJ, with "
+            "its quads as they are",
+            source=path,
+            field="--edges",
+        )
+    content = read_bytes(path, _SIZE_LIMIT)
+    try:
+        points, pairs = _of_obj(content) if suffix == ".obj" else _of_compas(content)
+    except InputError as error:
+        raise error.at(path) from None
+    if not pairs:
+        raise InputError("contains no faces, nor a graph, whose edges are laths", source=path)
+    if len(pairs) > _MOST_EDGES:
+        raise InputError(
+            f"has {len(pairs):,} edges, at most {_MOST_EDGES:,} are read as laths", source=path
+        )
+    curves = [
+        DrawnCurve(points[[a, b]], False, f"edge from ({_text(points[a])}) to ({_text(points[b])})")
+        for a, b in pairs
+    ]
+    return Drawing([curve for curve in curves if np.ptp(curve.points, axis=0).any()])
+
+
+def _text(point: np.ndarray) -> str:
+    return ", ".join(f"{value:.6g}" for value in point)
+
+
+def _of_obj(content: bytes) -> Edges:
+    found = parse_obj(content)
+    return found.vertices, _sides(face for face, _ in found.faces)
+
+
+def _of_compas(content: bytes) -> Edges:
+    """Of the one mesh or graph in the file."""
+    try:
+        found = list(_structures(json.loads(content.decode("utf-8-sig"))))
+        if len(found) != 1:
+            raise InputError(f"expected one COMPAS mesh or graph, found {len(found)}")
+        return _mesh_edges(found[0]) if "face" in found[0] else _graph_edges(found[0])
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"can't be read as JSON of COMPAS: {str(error)[:100]}") from None
+
+
+def _mesh_edges(data: Mapping[str, Any]) -> Edges:
+    names, points = _nodes(data, data["vertex"])
+    return points, _sides([names[_key(k)] for k in face] for face in data["face"].values())
+
+
+def _graph_edges(data: Mapping[str, Any]) -> Edges:
+    names, points = _nodes(data, data["node"])
+    pairs = {
+        tuple(sorted((names[_key(u)], names[_key(v)])))
+        for u, others in data["edge"].items()
+        for v in others
+    }
+    return points, sorted((a, b) for a, b in pairs if a != b)
+
+
+def _nodes(
+    data: Mapping[str, Any], nodes: Mapping[str, Mapping[str, Any]]
+) -> tuple[dict[str, int], np.ndarray]:
+    """Numbers of nodes by their keys, and their places (n, 3)."""
+    given = (data.get(name) for name in ("default_vertex_attributes", "default_node_attributes"))
+    default: dict[str, Any] = {"x": 0.0, "y": 0.0, "z": 0.0}
+    for attributes in (data.get("dva"), data.get("dna"), *given):
+        default |= attributes or {}
+    points = np.array(
+        [[float(own.get(axis, default[axis])) for axis in "xyz"] for own in nodes.values()]
+    ).reshape(-1, 3)
+    if not (np.abs(points) <= LARGEST).all():
+        raise InputError("has a node without finite coordinates")
+    return {_key(key): k for k, key in enumerate(nodes)}, points
+
+
+def _key(key: Any) -> str:
+    """A node's key; early versions wrote texts within texts."""
+    return str(key).strip("'\"")
+
+
+def _sides(polygons: Iterable[Sequence[int]]) -> list[tuple[int, int]]:
+    """Pairs of vertices that polygons join, each once."""
+    pairs = {
+        (min(a, b), max(a, b))
+        for polygon in polygons
+        for a, b in zip(polygon, [*polygon[1:], polygon[0]])
+        if a != b
+    }
+    return sorted(pairs)
+
+
+def _structures(data: Any) -> Iterator[Mapping[str, Any]]:
+    """All meshes and graphs among the objects of a COMPAS file."""
+    if isinstance(data, list):
+        for item in data:
+            yield from _structures(item)
+    elif isinstance(data, dict):
+        pairs = (("vertex", "face"), ("node", "edge"))
+        if any(all(isinstance(data.get(name), dict) for name in pair) for pair in pairs):
+            yield data
+        else:
+            for item in data.values():
+                yield from _structures(item)
