@@ -56,7 +56,11 @@ class _Parser(argparse.ArgumentParser):
     def refuse(self, unknown: Sequence[str]) -> NoReturn:
         """End for arguments that aren't known, with the option that may have been meant."""
         first = unknown[0].partition("=")[0]
-        hint = did_you_mean(first, self._option_string_actions) if first.startswith("-") else ""
+        hint = ""
+        if first in self._option_string_actions:
+            hint = f"it goes after the command, as in {self.prog} {first}"
+        elif first.startswith("-"):
+            hint = did_you_mean(first, self._option_string_actions)
         if not hint and os.path.exists(first) and "--designs" in self.options():
             hint = "several designs are one folder, or some of a folder by --designs NAME,NAME"
         self.error(f"unknown argument {' '.join(unknown)}{': ' if hint else ''}{hint.strip()}")

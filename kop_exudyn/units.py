@@ -17,6 +17,7 @@ from .errors import InputError, did_you_mean
 # metres and newtons of one unit
 LENGTHS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}
 FORCES = {"N": 1.0, "kN": 1e3, "MN": 1e6, "lbf": 4.4482216152605, "kip": 4448.2216152605}
+_WRITTEN_OUT = 1e7  # larger numbers are shown with a power of ten
 STANDARD_GRAVITY = 9.80665  # m / s^2 (CGPM 1901)
 
 _STRESS_NAMES = {("m", "N"): "Pa", ("m", "kN"): "kPa", ("m", "MN"): "MPa", ("mm", "N"): "MPa"}
@@ -128,12 +129,24 @@ _UNNAMED = {
 }
 
 
+def plain_number(value: float, digits: int = 4) -> str:
+    """A number as people write it: to so many significant digits, but without powers of ten as
+    long as it has no more than seven digits before its point.
+
+    digits : significant ones; "2420" and "13350" are of three and four
+    """
+    text = f"{value:.{digits}g}"
+    if "e+" not in text or abs(float(text)) >= _WRITTEN_OUT:
+        return text
+    return f"{float(text):.0f}"
+
+
 def with_unit(value: float, quantity: str, units: Units | None, digits: int = 4) -> str:
     """A number with its unit, as "12.3 MPa".
 
     digits : significant ones that are shown
     """
-    return f"{value:.{digits}g} {unit_of(quantity, units)}"
+    return f"{plain_number(value, digits)} {unit_of(quantity, units)}"
 
 
 def in_millimetres(value: float, units: Units | None, digits: int = 3) -> str:
@@ -143,7 +156,7 @@ def in_millimetres(value: float, units: Units | None, digits: int = 3) -> str:
     """
     if units is None:
         return with_unit(value, "length", units, digits)
-    return f"{1000 * units.metres * value:.{digits}g} mm"
+    return f"{plain_number(1000 * units.metres * value, digits)} mm"
 
 
 def common_units(named: Mapping[str, Units | None], what: str = "designs") -> Units | None:

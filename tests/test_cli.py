@@ -616,6 +616,7 @@ class TestSizes:
     [
         ("optimze models", "did you mean 'optimize'"),
         ("simulate DESIGN --jsn", "unknown argument --jsn: did you mean '--json'"),
+        ("-q simulate DESIGN", "-q: it goes after the command, as in kop simulate -q"),
         ("simulate DESIGN --engine exudin", "did you mean 'exudyn'"),
         ("optimize FOLDER --parts linera=3 --out OUT", "--parts = 'linera'.*did you mean 'linear'"),
         ("view DESIGN --out DESIGN", "exists already .--overwrite replaces it"),

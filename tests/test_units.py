@@ -12,7 +12,7 @@ from kop_exudyn.io.designs import load_all
 from kop_exudyn.io.kits import load_kit, save_kit
 from kop_exudyn.kit.parts import Kit
 from kop_exudyn.search.run import optimize_kit
-from kop_exudyn.units import FORCES, LENGTHS, Units, common_units, unit_of, with_unit
+from kop_exudyn.units import FORCES, LENGTHS, Units, common_units, plain_number, unit_of, with_unit
 
 NEWTON_METRES = Units("m", "N")
 
@@ -53,7 +53,26 @@ def test_named_units_are_what_they_say():
 
 def test_numbers_without_units_say_so():
     assert with_unit(0.123456, "length", None) == "0.1235 units of length"
-    assert with_unit(1.5e6, "stress", NEWTON_METRES) == "1.5e+06 Pa"
+    assert with_unit(1.5e10, "stress", NEWTON_METRES) == "1.5e+10 Pa"
+
+
+@pytest.mark.parametrize(
+    "value, digits, text",
+    [
+        (2500.0, 3, "2500"),
+        (13346.9, 4, "13350"),
+        (2499.96, 4, "2500"),
+        (-56789.0, 3, "-56800"),
+        (9999999.0, 4, "1e+07"),
+        (2.345e8, 4, "2.345e+08"),
+        (12.345, 4, "12.35"),
+        (0.000012, 4, "1.2e-05"),
+        (0.0, 4, "0"),
+    ],
+)
+def test_lengths_in_millimetres_are_written_out(value, digits, text):
+    """Nobody reads a span of "2.5e+03 mm" off a drawing."""
+    assert plain_number(value, digits) == text
 
 
 def test_unknown_units():

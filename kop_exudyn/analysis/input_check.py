@@ -24,6 +24,7 @@ from ..kit.kinds import part_kind
 from ..search.input_fit import fit_input
 from ..structures.base import Design, can_be_rescaled
 from ..structures.stacking import group_designs, stacked_groups, stacked_parameters
+from ..structures.strength import beyond_limit
 from .simulation import simulate
 
 OFF_TARGET = 1.0  # %: inputs that deviate more than this blame the kit
@@ -54,7 +55,7 @@ class DesignCheck:
     """One design.
 
     failed : why it can't be simulated, None where it can: then it opens into a stable state
-    max_percent, mean_percent : its own deviation from its target, % of its size
+    max_percent, mean_percent, max : its own deviation from its target, % of its size; in units
     fitted_percent : the largest deviation after `fit_input`, None where that wasn't tried
     displaced_percent : how far joints slid along the target
     utilisation : by state, the largest equivalent stress over the elastic limit; None if unknown
@@ -70,6 +71,7 @@ class DesignCheck:
     failed: str | None = None
     max_percent: float | None = None
     mean_percent: float | None = None
+    max: float | None = None
     fitted_percent: float | None = None
     displaced_percent: float | None = None
     utilisation: dict[str, float | None] = field(default_factory=dict)
@@ -91,10 +93,13 @@ class DesignCheck:
             better = (
                 ""
                 if self.fitted_percent is None
-                else f"; fit_input alone brings that to {self.fitted_percent:.2g} %"
+                else f"; its own parameters could bring that to {self.fitted_percent:.2g} % "
+                "(kop.fit_input in Python; the search for a kit goes there by itself)"
             )
             found.append(f"is {self.max_percent:.2g} % off its own target{better}")
-        over = {role: u for role, u in self.utilisation.items() if u is not None and u > 1}
+        over = {
+            role: u for role, u in self.utilisation.items() if u is not None and beyond_limit(u)
+        }
         found += [
             f"is stressed to {100 * u:.0f} % of the elastic limit ({role}): bending stress goes "
             f"with the thickness, so {100 / u:.0f} % of it would just do"
@@ -194,7 +199,8 @@ def _simulate(check: DesignCheck, design: Design, fit: bool) -> None:
         return
     check.max_percent, check.mean_percent = result.fit.max_percent, result.fit.mean_percent
     check.displaced_percent = result.displaced_percent
-    strength = result.to_dict()["strength"]
+    data = result.to_dict()
+    check.max, strength = data["fit"]["max"], data["strength"]
     check.utilisation = {role: state["utilisation"] for role, state in strength.items()}
     if fit and result.fit.max_percent > OFF_TARGET:
         with suppress(SimulationFailure):  # then there is nothing to tell

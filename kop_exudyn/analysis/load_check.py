@@ -23,7 +23,7 @@ from ..structures.base import Design
 from ..structures.loading import LoadedState, held_scene, loaded_scene, loaded_state
 from ..structures.loads import LoadCase
 from ..structures.opening import SAME_STATE
-from ..structures.strength import materials_of, rod_strength
+from ..structures.strength import beyond_limit, materials_of, rod_strength
 from ..structures.thickness import resolved, thickened_scene
 
 _STEPS = 4  # to the factor that is asked for
@@ -77,14 +77,17 @@ class LoadCheck:
     @property
     def stiff(self) -> bool:
         """Whether the deflection keeps to its limit."""
-        return self.deflection <= self.allowed or (self.allowed == np.inf and self.stable)
+        if self.allowed == np.inf:
+            return self.stable or not np.isnan(self.deflection)
+        return not np.isnan(self.deflection) and not beyond_limit(self.deflection, self.allowed)
 
     def carried(self, safety: float = 1.0) -> bool:
         """Whether deflection, stress and stability are within their limits.
 
         safety : factor by which the elastic limit is divided
         """
-        strong = self.utilisation is None or safety * self.utilisation <= 1
+        used = self.utilisation
+        strong = used is None or not beyond_limit(safety * used)
         return self.failed is None and self.stable and self.stiff and strong
 
     def to_dict(self) -> dict[str, Any]:

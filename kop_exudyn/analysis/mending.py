@@ -15,12 +15,11 @@ from ..search.objective import DesignObjective, Evaluation
 from ..search.stage_results import SAME_STATE
 from ..search.tolerance import Tolerance, sample_spread
 from ..structures.base import Design
-from ..structures.strength import design_strength, materials_of, rod_strength
+from ..structures.strength import beyond_limit, design_strength, materials_of, rod_strength
 from ..structures.thickness import board_of, keeping_limit
 from ..units import in_millimetres
 from .load_check import LoadCheck, carrying_thickness
 
-_ROUNDING = 1e-6  # of the limit: a search that keeps to it may end on it
 _HALVINGS = 3  # of the tolerance, until nothing snaps
 
 
@@ -80,17 +79,17 @@ def about_stress(
         for name, (scene, state) in states.items()
     }
     known = {name: value for name, value in utilisation.items() if value is not None}
-    if not known or safety * max(known.values()) <= 1 + _ROUNDING:
+    if not known or not beyond_limit(safety * max(known.values())):
         return utilisation, []
     worst = max(known, key=lambda name: known[name])
     limit = "its elastic limit" if safety == 1 else f"its elastic limit over {safety:g}"
     where = worst if " " in worst else f"{worst} state"  # stations: "opened by 50%"
-    why = f"stressed to {100 * safety * known[worst]:.0f} % of {limit} ({where})"
+    why = f"stressed to {_share(safety * known[worst])} of {limit} ({where})"
     if inputs is not None:
         as_given = [found.largest for found in design_strength(design, inputs).values()]
         own = max((value for value in as_given if value is not None), default=0.0)
-        if safety * own > 1:
-            why += f", and the design as given to {100 * safety * own:.0f} %"
+        if beyond_limit(safety * own):
+            why += f", and the design as given to {_share(safety * own)}"
     beyond = [states[name] for name, value in known.items() if value > 0.5 * known[worst]]
     share = keeping_limit(beyond, materials, 1 / safety)
     if share is None:
@@ -157,13 +156,11 @@ def _failing(design: Design, check: LoadCheck, safety: float) -> list[str]:
     elif check.failed is not None:
         found.append(f"was not found: {check.failed}")
     if check.loaded is not None and not check.stiff:
-        moved, allowed = (
-            in_millimetres(value, design.units) for value in (check.deflection, check.allowed)
-        )
+        moved, allowed = _apart(check.deflection, check.allowed, design)
         found.append(f"deflects by {moved} ({allowed} is allowed)")
     used = check.utilisation
-    if used is not None and safety * used > 1:
-        found.append(f"is stressed to {100 * safety * used:.0f} % of its elastic limit")
+    if used is not None and beyond_limit(safety * used):
+        found.append(f"is stressed to {_share(safety * used)} of its elastic limit")
     return found
 
 
@@ -174,13 +171,24 @@ def _carrying(design: Design, deployed: Equilibrium, check: LoadCheck, safety: f
         return "not even four times the thickness carries it: more supports, or less load"
     share, used = thicker
     helps = f"{_section(design, share)} would carry it"
-    if used is not None and safety * used > 1:
+    if used is not None and beyond_limit(safety * used):
         helps = (
             f"{_section(design, share)} would be stiff enough, but stressed to "
-            f"{100 * safety * used:.0f} % of its elastic limit: more supports, less load, or a "
+            f"{_share(safety * used)} of its elastic limit: more supports, less load, or a "
             "flatter shape"
         )
     return helps
+
+
+def _share(used: float) -> str:
+    """A share beyond 1 in percent, with as many digits as show that it is beyond."""
+    return f"{100 * used:.0f} %" if used >= 1.01 else f"{100 * used:.6g} %"
+
+
+def _apart(value: float, limit: float, design: Design) -> tuple[str, str]:
+    """Two lengths in words, with as many digits as tell them apart."""
+    words = [[in_millimetres(x, design.units, n) for x in (value, limit)] for n in (3, 4, 5, 6, 9)]
+    return next(((a, b) for a, b in words if a != b), (words[-1][0], words[-1][1]))
 
 
 def _section(design: Design, share: float) -> str:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..units import Units, common_units, in_millimetres, plain_number, unit_of
 from .options import add_designs, add_selection
 from .output import add_json, report
 from .values import number_pair, part_counts
 
 if TYPE_CHECKING:
-    from ..analysis.input_check import DesignCheck
+    from ..analysis.input_check import DesignCheck, ElementCost
 
 HELP = "say what is wrong with designs, and which ones make a kit expensive"
 DESCRIPTION = """Opens every design of a folder, or of a study file, by itself: whether it does, how
@@ -85,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
     } | {kind: count for kind, count in given.items() if kind not in counts}
     checks = check_designs(designs, parts)
     data: dict[str, Any] = {"parts": parts, "designs": [check.to_dict() for check in checks]}
-    text = _text(checks, parts)
+    text = _text(checks, parts, common_units({d.name: d.units for d in designs}))
     if args.harmonise is not None:
         found = _harmonised(args, study.files, designs, parts)
         data["harmonised"] = found
@@ -111,7 +113,7 @@ def _harmonised(
     }
 
 
-def _text(checks: list[DesignCheck], parts: Mapping[str, int]) -> str:
+def _text(checks: list[DesignCheck], parts: Mapping[str, int], units: Units | None) -> str:
     kit = " and ".join(f"{count} {kind}" for kind, count in parts.items())
     lines = [f"{len(checks)} designs, compared by a kit of {kit} parts"]
     for check in checks:
@@ -119,8 +121,9 @@ def _text(checks: list[DesignCheck], parts: Mapping[str, int]) -> str:
         if check.failed is None:
             used = [u for u in check.utilisation.values() if u is not None]
             strength = f", stress {100 * max(used):.0f} % of the elastic limit" if used else ""
+            length = "" if check.max is None else f" ({in_millimetres(check.max, units)})"
             lines.append(
-                f"  opens; deviation max {check.max_percent:.2g} %, mean "
+                f"  opens; deviation max {check.max_percent:.2g} %{length}, mean "
                 f"{check.mean_percent:.2g} % of its size{strength}"
             )
         lines.append(
@@ -130,8 +133,8 @@ def _text(checks: list[DesignCheck], parts: Mapping[str, int]) -> str:
         )
         for cost in check.expensive[:1]:
             lines.append(
-                f"  dearest: {cost.kind} element {cost.number} ({_numbers(cost.parameters)}), its "
-                f"part ({_numbers(cost.part)}): {cost.percent:.2g} % of the energy"
+                f"  dearest: {cost.kind} element {cost.number} of {_sizes(cost, units)}, its part "
+                f"of {_sizes(cost, units, part=True)}: {cost.percent:.2g} % of the energy"
             )
         lines += [f"  PROBLEM: {problem}" for problem in check.problems]
         lines += [f"  advice: {advice}" for advice in check.advice]
@@ -146,5 +149,12 @@ def _about_sizes(found: Mapping[str, Any]) -> str:
     )
 
 
-def _numbers(values: list[float]) -> str:
-    return ", ".join(f"{value:.4g}" for value in values)
+def _sizes(cost: ElementCost, units: Units | None, part: bool = False) -> str:
+    """The parameters of an element or of its part, with their unit."""
+    from ..kit.kinds import part_kind
+
+    values = cost.part if part else cost.parameters
+    if part_kind(cost.kind).angular:
+        return " and ".join(f"{math.degrees(value):.4g}°" for value in values)
+    numbers = " and ".join(plain_number(value) for value in values)
+    return f"{numbers} {unit_of('length', units)}"

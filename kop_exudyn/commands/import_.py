@@ -4,15 +4,17 @@ our own."""
 from __future__ import annotations
 
 import argparse
+import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .output import add_json, report
-from .values import angle, held_joints, number_pair, patch, positive_number
+from .values import angle, held_joints, number_list, number_pair, patch, positive_number
 
 if TYPE_CHECKING:
+    from ..errors import InputError
     from ..exchange.drawing import Finding
     from ..exchange.drawn_networks import DrawnNetwork, ReadingOptions
     from ..exchange.imports import Imported
@@ -53,6 +55,26 @@ _OF_CLASSES = {
     "patch": ("umbrella",),
     "section": ("c_shell", "grid"),
     "material": ("c_shell", "grid"),
+    "layer": ("c_shell", "grid"),
+    "tolerance": ("c_shell", "grid"),
+}
+# What an option that a design needs is, with an example.
+_NEEDED = {
+    "opening": ": the angle that it opens by, as 35deg",
+    "section": " WIDTH,HEIGHT of its rods, in the design's unit",
+    "material": " YOUNG,POISSON of its rods, in the design's units",
+}
+_MATERIALS = ("arms", "plates")  # of an umbrella mesh
+# Fields of a design file, and the options that they come from.
+_FIELDS = {
+    "opening.angle": "--opening",
+    "held": "--held",
+    "patch": "--patch",
+    "section": "--section",
+    "material.young": "--material",
+    "material.poisson": "--material",
+    "material.density": "--density",
+    "material.elastic_limit": "--elastic-limit",
 }
 
 
@@ -131,13 +153,17 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="Young's modulus and Poisson's ratio",
     )
     shell.add_argument(
-        "--density", type=positive_number, metavar="RHO", help="of the material, for its weight"
+        "--density",
+        type=positive_number,
+        metavar="RHO",
+        help="of the material, for its weight; of umbrella meshes too",
     )
     shell.add_argument(
         "--elastic-limit",
-        type=positive_number,
+        type=number_list,
         metavar="SIGMA",
-        help="of the material, for its strength",
+        help="of the material, for its strength; of umbrella meshes too, as ARMS,PLATES "
+        "where these have different ones",
     )
     shell.add_argument(
         "--curves",
@@ -227,7 +253,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from ..errors import InputError
-    from ..exchange.curve_files import CURVE_READERS, is_drawing
+    from ..exchange.curve_files import CURVE_READERS, is_drawing, is_surface
     from ..exchange.other_formats import instead_of
     from ..files.files import check_output_file
     from ..geometry.mesh_files import MESH_SUFFIXES
@@ -238,21 +264,32 @@ def run(args: argparse.Namespace) -> int:
     if not args.file.name.lower().endswith(tuple(known)):
         how = instead_of(args.file.name)
         raise InputError(f"can't be imported{how} (known: {', '.join(known)})", source=args.file)
-    if args.out is None and args.preview is None:
-        raise InputError("nothing to do: give --out, --preview or both", source=args.file)
     for path in filter(None, (args.out, args.preview)):
         check_output_file(path, overwrite=args.overwrite)
-    drawn = is_drawing(args.file) or args.edges
+    surface = args.kind is None and is_drawing(args.file) and is_surface(args.file)
+    drawn = args.edges or (is_drawing(args.file) and not surface)
     wanted = args.kind or ("c_shell" if drawn and args.patch is None else None)
     lacks_patch = drawn and wanted == "umbrella" and args.patch is None  # is said below
     for option, classes in () if lacks_patch else _OF_CLASSES.items():
-        if getattr(args, option) is not None and (wanted or "umbrella") not in classes:
+        if getattr(args, option) not in (None, []) and (wanted or "umbrella") not in classes:
             raise InputError(
                 f"isn't for this import: it is for designs of class {' and '.join(classes)}",
                 field=f"--{option}",
             )
     if wanted in (None, "umbrella"):
+        if args.unit not in (None, "mm"):
+            raise InputError(
+                "umbrella meshes are in mm; --scale 1000 makes mm of metres",
+                field="--unit",
+                value=args.unit,
+            )
+        if len(args.elastic_limit or ()) > len(_MATERIALS):
+            raise InputError(
+                "expected one limit, or those of arms and plates", field="--elastic-limit"
+            )
         return _undrawn(args)
+    if args.elastic_limit is not None and len(args.elastic_limit) > 1:
+        raise InputError("a drawing's rods have one elastic limit", field="--elastic-limit")
     if not drawn:
         raise InputError(
             f"can't be made of this file: expected {' or '.join(CURVE_READERS)}",
@@ -282,7 +319,7 @@ def _drawing(args: argparse.Namespace, wanted: str) -> int:
         if made is None and not drawn.frame.flat and args.surface is None:
             drawn = with_heights_checked(drawn)
     except InputError as error:
-        error = error.at(args.file)
+        error = _by_option(error.at(args.file))
         if args.preview is not None:
             _save_preview(args, drawn, drawn.findings, units, refused=str(error))
         raise error from None
@@ -394,13 +431,28 @@ def _report(
     report(args, data, files + lines)
 
 
+def _by_option(error: InputError) -> InputError:
+    """The same error, its field named as the option that it was given with."""
+    from ..errors import InputError
+
+    option = next(
+        (o for field, o in _FIELDS.items() if error.field and error.field.startswith(field)), None
+    )
+    if option is None:
+        return error
+    message = error.message
+    if option == "--opening" and isinstance(error.value, float) and abs(error.value) > math.pi:
+        message = f"{message} (pi, in radians); {error.value:g} degrees are {error.value:g}deg"
+    return InputError(message, source=error.source, field=option, value=error.value)
+
+
 def _require(args: argparse.Namespace, wanted: str, *names: str) -> None:
     from ..errors import InputError
 
     what = {"c_shell": "a C-shell", "grid": "a grid"}[wanted]
     for name in names:
         if getattr(args, name) is None:
-            raise InputError(f"{what} needs --{name}", source=args.file)
+            raise InputError(f"{what} needs --{name}{_NEEDED[name]}", source=args.file)
 
 
 def _section(args: argparse.Namespace) -> dict[str, Any]:
@@ -414,7 +466,7 @@ def _material(args: argparse.Namespace) -> dict[str, float]:
         "young": young,
         "poisson": poisson,
         "density": args.density,
-        "elastic_limit": args.elastic_limit,
+        "elastic_limit": args.elastic_limit[0] if args.elastic_limit else None,
     }
     return {name: value for name, value in given.items() if value is not None}
 
@@ -426,11 +478,12 @@ def _undrawn(args: argparse.Namespace) -> int:
     from ..structures.base import design_from_dict
 
     data = _undrawn_data(args)
+    _add_materials(args, data)
     try:
         design = design_from_dict(data, str(args.out or args.file))
     except InputError as error:
-        raise InputError(
-            error.message, source=args.file, field=error.field, value=error.value
+        raise _by_option(
+            InputError(error.message, source=args.file, field=error.field, value=error.value)
         ) from None
     if args.preview is not None and design.class_name != "umbrella":
         raise InputError("shows drawings and umbrella meshes only", field="--preview")
@@ -445,6 +498,17 @@ def _undrawn(args: argparse.Namespace) -> int:
     told = {"design": args.out, "preview": args.preview, "class": data["class"]}
     _report(args, told | {"name": data["name"], "summary": figures}, rows)
     return 0
+
+
+def _add_materials(args: argparse.Namespace, data: dict[str, Any]) -> None:
+    """Density and elastic limits as options give them, in an umbrella mesh's content."""
+    limits = args.elastic_limit or ()
+    materials = data.get("materials", {})
+    for number, name in enumerate(name for name in _MATERIALS if name in materials):
+        if args.density is not None:
+            materials[name]["density"] = args.density
+        if limits:
+            materials[name]["elastic_limit"] = limits[min(number, len(limits) - 1)]
 
 
 def _figures(design: Design, data: dict[str, Any]) -> tuple[dict[str, Any], list[tuple[str, str]]]:
@@ -513,4 +577,4 @@ def _umbrella_on_mesh(args: argparse.Namespace) -> dict[str, Any]:
             plate_model=args.plates,
         )
     except InputError as error:
-        raise error.at(args.file) from None
+        raise _by_option(error.at(args.file)) from None

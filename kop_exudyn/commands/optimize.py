@@ -21,6 +21,7 @@ from .values import (
 if TYPE_CHECKING:
     from ..io.studies import Study
     from ..search.requirements import Requirements
+    from ..search.result import KitResult
 
 HELP = "find one kit of parts for several designs"
 DESCRIPTION = """Finds one kit of parts from which all designs of a folder, or of a study file, can
@@ -258,11 +259,19 @@ def run(args: argparse.Namespace) -> int:
             "verdict": list(result.verdict),
             "warnings": list(result.warnings),
         },
-        "".join(f"{line}\n" for line in (*result.verdict, *result.warnings, page)),
+        _lines(result, page),
     )
     if failed:
         sys.stderr.write(f"kop: these designs can't be built from the kit: {', '.join(failed)}\n")
     return 1 if failed else 0
+
+
+def _lines(result: KitResult, page: Path) -> str:
+    """The verdict, how far the designs are off, warnings, where the page is."""
+    from ..report.kit_cards import deviation_line
+
+    lines = (*result.verdict, deviation_line(result), *result.warnings, page)
+    return "".join(f"{line}\n" for line in lines if line)
 
 
 def _as_asked(args: argparse.Namespace, study: Study) -> Study:
@@ -325,7 +334,7 @@ def _smallest(args: argparse.Namespace, study: Study, parts: dict[str, int]) -> 
             "warnings": list(chosen.result.warnings),
             **row,
         },
-        "".join(f"{line}\n" for line in (*chosen.result.verdict, *chosen.result.warnings, page))
+        _lines(chosen.result, page)
         + f"{', '.join(f'{n} {kind}' for kind, n in chosen.sizes.items())} parts, largest "
         f"deviation {chosen.max_percent:.3g} %\n",
     )

@@ -224,14 +224,13 @@ def _carried(check: dict, units: Units | None) -> str:
 
 def _stress(strength: dict, units: Units | None) -> str:
     """The largest equivalent stress, and what it is of the elastic limit."""
+    from ..structures.strength import beyond_limit
     from ..units import with_unit
 
     if strength["equivalent_stress"] is None:
         return "unknown: the rods have no section"
     share = strength["utilisation"]
-    used = (
-        ""
-        if share is None
-        else f", {100 * share:.3g} % of the elastic limit{': it yields' if share > 1 else ''}"
-    )
+    used = "" if share is None else f", {100 * share:.3g} % of the elastic limit"
+    if beyond_limit(share):
+        used += ": it yields"
     return with_unit(strength["equivalent_stress"], "stress", units) + used

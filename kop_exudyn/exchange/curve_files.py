@@ -63,6 +63,18 @@ def read_drawing(path: str | Path, layers: Sequence[str] = ()) -> Drawing:
     return drawing
 
 
+def is_surface(path: str | Path) -> bool:
+    """Whether an OBJ file has faces and no curves, so that it is a surface and no drawing. Raises
+    InputError when it can't be read."""
+    if not str(path).lower().endswith(".obj"):
+        return False
+    try:
+        content = parse_obj(read_bytes(path, _SIZE_LIMIT))
+    except InputError as error:
+        raise error.at(path) from None
+    return bool(content.faces) and not content.lines and not content.curves
+
+
 def _obj_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
     """The `l` and `curv` elements of an OBJ file."""
     found = parse_obj(content)

@@ -318,7 +318,16 @@ def _ends_on_curves(
 
 
 def _missed(curves: Sequence[DrawnCurve], near: Sequence[EndContact]) -> list[Finding]:
-    """Ends that stop a little short of another curve."""
+    """Ends that stop a little short of another curve; where both curves end there, this is told of
+    the one that is nearer."""
+    told: list[EndContact] = []
+    for contact in near:
+        others_end = [o for o in told if (o.curve, o.other) == (contact.other, contact.curve)]
+        if not any(
+            np.hypot(*(o.position - contact.position)) <= abs(o.beyond) + abs(contact.beyond)
+            for o in others_end
+        ):
+            told.append(contact)
     return [
         Finding(
             "suspicious",
@@ -326,7 +335,7 @@ def _missed(curves: Sequence[DrawnCurve], near: Sequence[EndContact]) -> list[Fi
             f"{curves[contact.other].label}: a joint may be meant (--tolerance)",
             curves[contact.curve].points[contact.end][None],
         )
-        for contact in near
+        for contact in told
     ]
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..units import Units, with_unit
+from ..units import Units, plain_number, with_unit
 from .drawing import Finding
 from .drawn_networks import DrawnNetwork, network_summary
 
@@ -46,8 +46,9 @@ def import_rows(
     if "joints" in figures:
         rows.append(("joints", str(figures["joints"])))
         if figures["spans"]:
-            shortest, longest = (f"{figures[f'{k}_span']:.3g}" for k in ("shortest", "longest"))
-            median = with_unit(figures["median_span"], "length", units, 3)
+            ends = (figures[f"{end}_span"] for end in ("shortest", "longest"))
+            shortest, longest = map(plain_number, ends)
+            median = with_unit(figures["median_span"], "length", units)
             rows.append(
                 ("spans", f"{figures['spans']} of {shortest} to {longest}, median {median}")
             )

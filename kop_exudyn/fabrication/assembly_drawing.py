@@ -1,7 +1,7 @@
 """Assembly drawings: a design laid out flat, every piece labelled where and as it is built in.
 
 Rods carry their part's label along the side that is the part's side 1, and the element's number of
-the assembly plan along the other one; corners carry their part's label, with "-" where they are
+the assembly plan along the other one; corners carry their part's label, with "·f" where they are
 built in flipped. Where lamellas cross, the upper one is drawn through. The scale is the smallest
 standard one at which no label covers another.
 """
@@ -28,6 +28,7 @@ from ..drawing.style import FAINT, INK, QUIET, save_figure, style
 from ..files.files import file_stem, make_folder
 from ..kit.kinds import has_joint, part_kind
 from ..scene.state import State
+from .assembly import stands_on_edge
 from .lamellas import UPPER, Lamellas
 from .options import millimetres
 from .paper import SCALES, Book, fitting_scale, scale_name
@@ -162,7 +163,7 @@ class AssemblyDrawing:
     def _corner_label(self, piece: Piece, label: str, scale: float) -> Iterator[Label]:
         at = self.corners.get(piece.parameters[0])
         if at is not None:
-            text = ("-" if piece.values[0] < 0 else "") + label
+            text = label + ("·f" if piece.values[0] < 0 else "")
             places = [
                 at / scale + r * np.array([np.cos(turn), np.sin(turn)])
                 for r in (2.2, 3.2, 4.5)
@@ -366,25 +367,49 @@ def assembly_pages(book: Book, drawing: AssemblyDrawing) -> None:
         page.text(page.low[0], page.low[1], explanation(drawing.placed), 7, color=QUIET)
         return
     inner = room - _OVERLAP
-    counts = np.maximum(np.ceil((size / scale + 14.0 - _OVERLAP) / inner), 1).astype(int)
+    counts, scale = _tiles(size, inner, scale)
     page.scale = fitting_scale(size, room - 4.0)
-    page.heading += f": where its {counts.prod()} pages are"
     origin = low + room / 2 - drawing.box.mean(axis=0) / page.scale
     drawing.draw(page.ax, page.scale, origin, None)
     page.text(page.low[0], page.low[1], explanation(drawing.placed), 7, color=QUIET)
     corner = drawing.box.mean(axis=0) / scale - (counts * inner + _OVERLAP) / 2
-    for number in range(counts.prod()):
-        place_ = np.array([number % counts[0], counts[1] - 1 - number // counts[0]])
-        tile = corner + place_ * inner  # lower left, on paper at the drawing's scale
+    drawn = shapely.union_all(
+        [shapely.LineString(line / scale) for line in drawing.lines]
+        + [shapely.Polygon(cell / scale) for cell in drawing.cells]
+    )
+    places = [
+        np.array([column, row]) for row in reversed(range(counts[1])) for column in range(counts[0])
+    ]
+    tiles = [corner + at * inner for at in places]  # lower left, on paper at the drawing's scale
+    kept = [k for k, at in enumerate(tiles) if drawn.intersects(shapely.box(*at, *(at + room)))]
+    names = {tuple(places[k].tolist()): number for number, k in enumerate(kept, 1)}
+    page.heading += f": where its {len(kept)} pages are"
+    for number, tile in enumerate((tiles[k] for k in kept), 1):
         lower, upper = (origin + at * scale / page.scale for at in (tile, tile + room))
         ring = np.array([lower, [upper[0], lower[1]], upper, [lower[0], upper[1]], lower])
         page.line(ring, QUIET, 0.15)
         x, y = (lower + upper) / 2
-        page.text(x, y, str(number + 1), 16, color=QUIET, ha="center", va="center", alpha=0.6)
-        one = book.page(f"Assembly of {drawing.name}, part {number + 1} of {counts.prod()}", scale)
+        page.text(x, y, str(number), 16, color=QUIET, ha="center", va="center", alpha=0.6)
+        one = book.page(f"Assembly of {drawing.name}, part {number} of {len(kept)}", scale)
         drawing.draw(one.ax, scale, low - tile, np.array([low, low + room]))
-        note = f"{_OVERLAP:g} mm are shared with the next parts: {_neighbours(number, counts)}"
+        beside = _neighbours(places[kept[number - 1]], names)
+        note = f"{_OVERLAP:g} mm are shared with the next parts: {beside}"
         one.text(one.low[0], one.low[1], note, 7, color=QUIET)
+
+
+def _tiles(size: np.ndarray, inner: np.ndarray, scale: float) -> tuple[np.ndarray, float]:
+    """How many pages across and down a drawing takes, and its scale there: the largest drawing on
+    as many pages as the scale that is asked for needs.
+
+    size : of the thing, mm; inner : what a page adds to the one before, mm
+    """
+
+    def pages(at: float) -> np.ndarray:
+        return np.maximum(np.ceil((size / at + 14.0 - _OVERLAP) / inner), 1).astype(int)
+
+    wanted = pages(scale)
+    larger = [s for s in SCALES if s <= scale and (pages(s) == wanted).all()]
+    return wanted, min(larger)
 
 
 def save_assembly_drawing(
@@ -428,17 +453,21 @@ def explanation(placed: PlacedPieces) -> str:
         text = (
             "part (m: mirrored, top and bottom change places), below it the element · grey: joint"
         )
-    angular = any(part_kind(kind).angular for kind in kinds)
-    return text + (" · diamonds: corners, - for flipped" if angular else "")
+    if not any(part_kind(kind).angular for kind in kinds):
+        return text
+    if not stands_on_edge(placed):
+        return f"{text} · diamonds: corners (·f: flipped, turned over)"
+    return (
+        f"{text}\ndiamonds: corners, bent so that the lamella rises towards you at its ends (·f: "
+        "flipped, it falls away)"
+    )
 
 
-def _neighbours(number: int, counts: np.ndarray) -> str:
-    """Which parts lie to the left, right, above and below a part."""
-    column, row = number % counts[0], number // counts[0]
-    sides = {"left": (-1, 0), "right": (1, 0), "above": (0, -1), "below": (0, 1)}
-    found = [
-        f"{side} {number + dx + dy * counts[0] + 1}"
-        for side, (dx, dy) in sides.items()
-        if 0 <= column + dx < counts[0] and 0 <= row + dy < counts[1]
-    ]
-    return ", ".join(found)
+def _neighbours(place: np.ndarray, names: Mapping[tuple[int, ...], int]) -> str:
+    """Which parts lie to the left, right, above and below a place.
+
+    names : number of the part at each place that has one, columns and rows counted from below
+    """
+    sides = {"left": (-1, 0), "right": (1, 0), "above": (0, 1), "below": (0, -1)}
+    near = {side: names.get(tuple((place + step).tolist())) for side, step in sides.items()}
+    return ", ".join(f"{side} {number}" for side, number in near.items() if number is not None)

@@ -185,7 +185,8 @@ class Blanks:
         if len(found) > 1:
             sizes = "; ".join(f"{name}: {board.section} mm" for board, name in found.items())
             raise InputError(
-                f"designs with different rods need cut sheets of their own ({sizes})",
+                f"designs with different rods need cut sheets of their own ({sizes}): give them "
+                "one section and material, or make a kit of each",
                 field="section",
             )
         return next(iter(found))

@@ -25,6 +25,11 @@ _ELSEWHERE = (
     "leg_mm",
     "bolt_hole_mm",
 )
+_ENDS = (
+    "Of a lamella's first and last piece one side is used. The other one stands out beyond the "
+    "last joint and carries nothing:\nit may be sawn off behind the joint where it is in the way "
+    "and no other design needs the whole piece."
+)
 
 
 def workshop_book(
@@ -55,7 +60,7 @@ def workshop_book(
     sheet_pages(book, sheets)
     for drawing in drawings:
         if steps := assembly_steps(blanks, drawing.name):
-            book.table(f"Assembly of {drawing.name}: steps", steps)
+            book.table(f"Assembly of {drawing.name}: steps", steps, _ENDS)
         assembly_pages(book, drawing)
     return book
 

@@ -21,8 +21,10 @@ from ..errors import InputError
 from ..files.files import write_bytes
 
 PAPERS = {"a4": (297.0, 210.0), "a3": (420.0, 297.0)}  # mm, across
-# millimetres of a thing that one millimetre on paper shows; those that rulers have
-SCALES = (0.1, 0.2, 0.5, 1.0, 2.0, 2.5, 5.0, 10.0, 20.0, 25.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
+# Millimetres of a thing that one millimetre on paper shows: those that rulers have, and some
+# between: every page has its own bar, and much of a page may stay empty otherwise.
+_STEPS = (1.0, 1.5, 2.0, 2.5, 4.0, 5.0, 7.5)
+SCALES = (0.1, 0.2, 0.5, *(step * power for power in (1.0, 10.0, 100.0) for step in _STEPS), 1000.0)
 
 _MM = 1 / 25.4
 _BORDER = 10.0  # mm of paper around the frame

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from ..drawing.labels import text_extent
 from ..drawing.style import FAINT, INK, QUIET
-from .blanks import Blanks, Strip
+from .blanks import Blanks, CornerPlate, Strip
 from .cutsheets import Sheet
 from .paper import Book, Page, fitting_scale
 from .shapes import CUT, ENGRAVE, NOTES, Hole, Polyline, Shape, Template, Text
@@ -18,6 +19,7 @@ from .templates import plate_template, strip_template
 _COLOURS = {CUT: INK, ENGRAVE: QUIET, NOTES: FAINT}
 _DIMENSION = 6.0  # points
 _STEP = 3.0  # mm between dimensions that stand side by side
+_NUMBERS = 14.0  # mm of a page for the numbers of bars
 _STRIPS_A_PAGE = 5  # at least, where the paper is high enough
 _STRIP_ROOM = 34.0  # mm of a page below and above a strip: caption and dimensions
 _STRIP_LEAST = 12.0  # mm of a page that a strip itself has at least
@@ -69,6 +71,7 @@ def plate_pages(book: Book, blanks: Blanks) -> None:
             color=QUIET,
         )
         for k, plate in enumerate(plates[first : first + across * down]):
+            angled = blanks.plates[first + k]
             corner = page.low + cell * [k % across, down - 1 - k // across]
             at = corner + [cell[0] / 2, 12.0 + size[1] / scale / 2]
             _template(page, plate, at - np.mean(plate.box, axis=0) / scale, scale)
@@ -84,7 +87,7 @@ def plate_pages(book: Book, blanks: Blanks) -> None:
             page.text(
                 corner[0] + cell[0] / 2,
                 corner[1] + 2.5,
-                f"{plate.count} pieces",
+                f"{plate.count} pieces; the second axis ends {_aside(angled)} mm off the first",
                 7,
                 ha="center",
                 va="center",
@@ -125,13 +128,14 @@ def cell_pages(book: Book, blanks: Blanks) -> None:
 
 def sheet_pages(book: Book, sheets: Sequence[Sheet]) -> None:
     """Every cut sheet, as large as the paper allows: what comes from the machine, to check and to
-    sort."""
-    for sheet in sheets:
+    sort. Those that are alike are on one page."""
+    for alike in _runs([(sheet.labels, _cuts(sheet)) for sheet in sheets]):
+        sheet = sheets[alike[0]]
         room = Page(book.paper, "").room
         scale = fitting_scale(np.array(sheet.size), room - [0.0, 6.0])
+        title = _title([sheets[k].title for k in alike])
         page = book.page(
-            f"{sheet.title}, {sheet.thickness:g} mm thick, "
-            f"{sheet.size[0]:g} x {sheet.size[1]:g} mm",
+            f"{title}, {sheet.thickness:g} mm thick, {sheet.size[0]:g} x {sheet.size[1]:g} mm",
             scale,
         )
         for shape in sheet.shapes:
@@ -145,9 +149,10 @@ def stock_pages(book: Book, blanks: Blanks, plan: StockPlan | None) -> None:
         return
     room = Page(book.paper, "").room
     longest = max(bar.length for bar in plan.bars)
-    scale = fitting_scale(np.array([longest, 1.0]), np.array([room[0] - 30.0, 1e9]))
+    scale = fitting_scale(np.array([longest, 1.0]), np.array([room[0] - 44.0, 1e9]))
     page, y = None, 0.0
-    for number, bar in enumerate(plan.bars, 1):
+    for alike in _runs([(bar.length, bar.pieces) for bar in plan.bars]):
+        bar = plan.bars[alike[0]]
         if page is None or y - 11.0 < page.low[1]:
             page = book.page(f"Bars to saw, {blanks.board.section} mm", scale)
             page.text(
@@ -163,8 +168,9 @@ def stock_pages(book: Book, blanks: Blanks, plan: StockPlan | None) -> None:
             )
             y = page.high[1] - 8.0
         y -= 10.0
-        x = page.low[0] + 10.0
-        page.text(page.low[0], y + 2.0, f"{number}", 8, va="center", weight="bold")
+        x = page.low[0] + _NUMBERS
+        numbers = f"{alike[0] + 1}" + (f"–{alike[-1] + 1}" if len(alike) > 1 else "")
+        page.text(page.low[0], y + 2.0, numbers, 8, va="center", weight="bold")
         page.line(
             [
                 [x, y],
@@ -190,13 +196,42 @@ def stock_pages(book: Book, blanks: Blanks, plan: StockPlan | None) -> None:
             page.text(x + step / 2, y + 1.9, text, 6.5, ha="center", va="center")
             x += step + blanks.options.kerf / scale
         page.text(
-            page.low[0] + 12.0 + bar.length / scale,
+            page.low[0] + _NUMBERS + 2.0 + bar.length / scale,
             y + 2.0,
-            f"left {bar.left:.0f}",
+            (f"{len(alike)} alike, " if len(alike) > 1 else "") + f"left {bar.left:.0f}",
             6.5,
             va="center",
             color=QUIET,
         )
+
+
+def _runs(items: Sequence[Any]) -> list[list[int]]:
+    """The numbers of items, those that follow each other and are equal together."""
+    found: list[list[int]] = []
+    for number, item in enumerate(items):
+        if found and items[found[-1][-1]] == item:
+            found[-1].append(number)
+        else:
+            found.append([number])
+    return found
+
+
+def _title(titles: Sequence[str]) -> str:
+    """ "cut sheets 3 to 5 of 11, alike" of sheets called "cut sheet 3 of 11" and so on."""
+    if len(titles) == 1:
+        return titles[0]
+    first, last = (title.split() for title in (titles[0], titles[-1]))
+    name, number, of = " ".join(first[:-3]), first[-3], first[-1]
+    return f"{name}s {number} to {last[-3]} of {of}, alike"
+
+
+def _cuts(sheet: Sheet) -> list[tuple[str, list[float]]]:
+    """What is cut on a sheet, as plain numbers."""
+    return [
+        (shape.layer, np.round(shape.box, 6).ravel().tolist())
+        for shape in sheet.shapes
+        if shape.layer == CUT
+    ]
 
 
 def _strip(page: Page, strip: Strip, at: np.ndarray, scale: float) -> None:
@@ -280,6 +315,12 @@ def _text(page: Page, shape: Text, origin: np.ndarray, scale: float, colour: str
     align = "center" if shape.align == "middle" else "left"
     if size >= 2.0:
         page.text(x, y, shape.text, size, color=colour, ha=align, va="center_baseline")
+
+
+def _aside(plate: CornerPlate) -> str:
+    """How far the end of a plate's second axis is off the line of the first: to lay it out by a
+    square instead of by degrees."""
+    return f"{abs(plate.leg * np.sin(plate.angle)):.1f}"
 
 
 def _list(values: Sequence[float]) -> str:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+
+import numpy as np
 
 from ..errors import InputError, SimulationFailure
 from ..search.result import KitResult
+from ..structures.strength import beyond_limit
 from .blanks import Blanks
 from .templates import templates
+
+_ROUND = 10  # mm, that sizes of sheets are rounded up to
 
 
 def obstacles(result: KitResult, blanks: Blanks | None = None) -> list[str]:
@@ -49,7 +55,7 @@ def _of_designs(result: KitResult) -> Iterator[str]:
             continue
         for state, strength in summary["strength"].items():
             used = strength["utilisation"]
-            if used is not None and used > 1:
+            if beyond_limit(used):
                 yield (
                     f"{design.name} is stressed to {100 * used:.0f} % of its elastic limit in its "
                     f"{state} state"
@@ -71,13 +77,18 @@ def _of_boards(blanks: Blanks) -> Iterator[str]:
         if blanks.options.stock and strip.cut_length > max(blanks.options.stock):
             yield (
                 f"part {strip.label} is {strip.cut_length:.0f} mm long, longer than the longest "
-                f"bar of {max(blanks.options.stock):g} mm"
+                f"bar of {max(blanks.options.stock):g} mm; --stock names longer ones"
             )
-    room = blanks.options.room
-    for template in templates(blanks):
-        width, height = template.size
-        if width > room[0] or height > room[1]:
-            yield (
-                f"part {template.label} of {width:.0f} x {height:.0f} mm is larger than a sheet's "
-                f"{room[0]:.0f} x {room[1]:.0f} mm"
-            )
+    room, options = blanks.options.room, blanks.options
+    sizes = {one.label: one.size for one in templates(blanks)}
+    too_large = {label for label, size in sizes.items() if size[0] > room[0] or size[1] > room[1]}
+    # the largest first: a sheet that holds it holds the others
+    for label in sorted(too_large, key=lambda label: -float(np.max(sizes[label]))):
+        width, height = sizes[label]
+        largest = np.max([sizes[label] for label in too_large], axis=0)
+        needed = np.maximum(largest + np.subtract(options.sheet, room), options.sheet)
+        w, h = (math.ceil(side / _ROUND) * _ROUND for side in needed.tolist())
+        yield (
+            f"part {label} of {width:.0f} x {height:.0f} mm is larger than a sheet's "
+            f"{room[0]:.0f} x {room[1]:.0f} mm; --sheet {w},{h} would do"
+        )

@@ -46,11 +46,13 @@ def strip_template(strip: Strip) -> Template:
         )
     shapes += _bolt_holes(strip, joint)
     shapes.append(Polyline(np.array([[0.0, 0.0], [length, 0.0]]), False, ENGRAVE))
-    height = min(0.3 * strip.board.breadth, 0.2 * strip.sides[0])
+    # what is free below the joint's hole
+    free = half - (0.0 if strip.hole is None else strip.hole / 2)
+    height = min(0.3 * strip.board.breadth, 0.2 * strip.sides[0], 0.7 * free)
     # the label below the axis at the joint, "1" on side 1 just beyond what a corner plate covers
     reach = (max(strip.bolts) if strip.bolts else strip.setback) - strip.setback
     shapes += [
-        Text(np.array([joint, -0.5 * half]), height, strip.label),
+        Text(np.array([joint, 0.5 * free - half]), height, strip.label),
         Text(np.array([reach + 0.6 * height, -0.5 * half]), 0.8 * height, "1"),
     ]
     name = f"{length:.1f} long, joint {joint:.1f} from end 1"

@@ -11,7 +11,7 @@ from importlib.resources import files
 from typing import Any
 
 from ..checks import LARGEST
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 
 _LONGEST = 160  # characters of a message that quotes what it found
 # Of numbers, whose powers stay within double precision, and of whole numbers.
@@ -171,9 +171,14 @@ def _message(error: Any) -> str:
     if error.validator == "const":
         return f"must be {json.dumps(limit)}"
     if error.validator == "enum":
-        return f"must be one of {', '.join(map(json.dumps, limit))}"
+        hint = did_you_mean(error.instance, limit) if isinstance(error.instance, str) else ""
+        return f"must be one of {', '.join(map(json.dumps, limit))}{hint and f' ({hint.strip()})'}"
+    if error.validator in ("oneOf", "anyOf"):
+        return _choice(error) or _short(error.message)
     if error.validator == "exclusiveMinimum":
         return "must be positive" if limit == 0 else f"must be larger than {limit:g}"
+    if error.validator == "exclusiveMaximum":
+        return "must be negative" if limit == 0 else f"must be smaller than {limit:g}"
     if error.validator in ("minimum", "maximum"):
         return f"must be at {'least' if error.validator == 'minimum' else 'most'} {limit:g}"
     if error.validator in ("minItems", "maxItems"):
@@ -182,17 +187,48 @@ def _message(error: Any) -> str:
         )
     if error.validator == "minLength":
         return "must not be empty"
-    return error.message if len(error.message) <= _LONGEST else f"{error.message[:_LONGEST]}..."
+    return _short(error.message)
+
+
+def _short(message: str) -> str:
+    return message if len(message) <= _LONGEST else f"{message[:_LONGEST]}..."
+
+
+def _choice(error: Any) -> str:
+    """What a value of several forms may be; "" where a form has no short name."""
+    forms: list[str] = []
+    hint = ""
+    for number, form in enumerate(error.validator_value):
+        words = form.get("enum", [form["const"]] if "const" in form else [])
+        if words:
+            forms += map(json.dumps, words)
+            if isinstance(error.instance, str):
+                hint = did_you_mean(error.instance, words)
+        elif form.get("type") == "array" and isinstance(error.instance, list):
+            return next(_message(one) for one in error.context if one.schema_path[0] == number)
+        elif isinstance(form.get("type"), str):
+            forms.append(_TYPES[form["type"]])
+        else:
+            return ""
+    return f"must be {', '.join(forms[:-1])} or {forms[-1]}{hint and f' ({hint.strip()})'}"
 
 
 def _known_fields(error: Any) -> set[str]:
     """Names that the schema at the error allows, those of the schemas it refers to included."""
     schema = error.schema
     names = set(schema.get("properties", {}))
-    for part in schema.get("allOf", ()):
-        referred = _schemas().get(part.get("$ref", "").removeprefix(_PREFIX), {})
-        names |= set(referred.get("properties", {}))
+    for part in (schema, *schema.get("allOf", ())):
+        names |= set(_referred(part.get("$ref", "")).get("properties", {}))
     return names
+
+
+def _referred(reference: str) -> Mapping[str, Any]:
+    """The schema that another one refers to: a whole one, or a definition in any of them."""
+    name, _, place = reference.partition("#/$defs/")
+    if not place:
+        return _schemas().get(name.removeprefix(_PREFIX), {})
+    homes = [_schemas()[name.removeprefix(_PREFIX)]] if name else _schemas().values()
+    return next((home["$defs"][place] for home in homes if place in home.get("$defs", {})), {})
 
 
 def dotted(path: list[str | int]) -> str:

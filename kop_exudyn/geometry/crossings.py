@@ -73,11 +73,15 @@ def near_crossings(curves: Sequence[Curve], reach: float) -> list[Crossing]:
     good = _on(closed[a], lengths[a], s, reach) & _on(closed[b], lengths[b], t, reach)
     good &= (gap <= 1e-3 * TOLERANCE * size_of(curves)) & (np.abs(sine) > np.sin(_LEAST_ANGLE))
     keep = np.flatnonzero(good)
-    x = _frames(curves, a[keep], s[keep])[0]
-    return [
-        Crossing((int(a[k]), int(b[k])), (float(s[k]), float(t[k])), x[n])
-        for n, k in enumerate(keep.tolist())
-    ]
+    x, margin = _frames(curves, a[keep], s[keep])[0], TOLERANCE * size_of(curves)
+    found: dict[Pair, list[Crossing]] = {}
+    for k, position in zip(keep.tolist(), x):
+        others = found.setdefault((int(a[k]), int(b[k])), [])
+        # neighbouring pieces find the same one
+        if all(np.hypot(*(position - other.position)) > margin for other in others):
+            stations = (float(s[k]), float(t[k]))
+            others.append(Crossing((int(a[k]), int(b[k])), stations, position))
+    return [crossing for crossings in found.values() for crossing in crossings]
 
 
 def given_crossings(curves: Sequence[Curve], listed: Sequence[Mapping[str, Any]]) -> list[Crossing]:

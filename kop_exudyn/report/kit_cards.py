@@ -10,6 +10,7 @@ from PIL import Image
 
 from ..analysis.verdict import Buildable
 from ..search.result import KitResult
+from ..structures.strength import beyond_limit
 from ..units import Units, in_millimetres
 from .kit_picture import png
 from .page import Card
@@ -56,6 +57,32 @@ def percent_explained(result: KitResult) -> str:
     return f"{PERCENT} ({sizes})."
 
 
+def deviation_words(result: KitResult) -> str:
+    """How far the built designs are off at most, the worst of them: joints, and the rods between
+    where these are farther off; "" where no design was found."""
+    fits = [result.summary("assigned", n).get("fit") for n in range(len(result.designs))]
+    known = [fit for fit in fits if fit is not None]
+
+    def within(name: str) -> str:
+        percent = max(fit[f"{name}_percent"] for fit in known)
+        length = in_millimetres(max(fit[name] for fit in known), result.units)
+        return f"within {percent:.2g} % ({length})"
+
+    if not known:
+        return ""
+    text = f"every joint {within('max')} of its target"
+    if max(fit["pieces_max"] for fit in known) > max(fit["max"] for fit in known):
+        text += f", the rods between them {within('pieces_max')}"
+    return text
+
+
+def deviation_line(result: KitResult) -> str:
+    """`deviation_words` as a sentence."""
+    words = deviation_words(result)
+    keeps = "they keep" if len(result.designs) > 1 else "it keeps"
+    return f"Built, {keeps} {words}." if words else ""
+
+
 def deviation_rows(result: KitResult) -> tuple[list[str], list[list[Any]]]:
     """Headings and rows: how far each built design is from its target, in percent and in units."""
     unit = "mm" if result.units is not None else "units of length"
@@ -99,17 +126,19 @@ def _badge(verdict: Buildable | None, summary: dict[str, Any]) -> tuple[str, boo
 def _lines(
     result: KitResult, n: int, summary: dict[str, Any], verdict: Buildable | None
 ) -> list[tuple[str, str, bool]]:
-    used = result.pieces()[n]
+    counted = result.pieces()[n]
     different = " + ".join(
-        f"{np.count_nonzero(counts)} {kind}" for kind, counts in used.items() if counts.any()
+        f"{np.count_nonzero(counts)} {kind}" for kind, counts in counted.items() if counts.any()
     )
-    total = sum(int(counts.sum()) for counts in used.values())
+    total = sum(int(counts.sum()) for counts in counted.values())
     lines = [("pieces", f"{total}, of {different} parts", False)]
     if "fit" in summary:
         lines += _off(summary["fit"], result.units)
     largest = _largest(verdict, summary)
     if largest is not None:
-        lines.append(("stress", f"{100 * largest:.0f} % of the elastic limit", largest > 1))
+        lines.append(
+            ("stress", f"{100 * largest:.0f} % of the elastic limit", beyond_limit(largest))
+        )
     if verdict is not None:
         lines += _opening(verdict)
         lines += [

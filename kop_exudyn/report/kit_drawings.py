@@ -15,6 +15,7 @@ from ..search.objective import Evaluation
 from ..search.result import INPUT, REDEPLOYED, STAGES, KitResult
 from ..search.starts import TriedStart
 from ..structures.base import Design
+from ..structures.strength import beyond_limit
 from ..units import unit_of
 from .designs import DrawnDesign, DrawnState
 from .history import History, HistoryStep
@@ -280,7 +281,7 @@ def _about_strength(name: str, summary: Mapping) -> str:
     beyond = [
         f"{strength['utilisation']:.2f} times in its {role} state"
         for role, strength in summary.get("strength", {}).items()
-        if (strength["utilisation"] or 0) > 1
+        if beyond_limit(strength["utilisation"])
     ]
     return (
         (

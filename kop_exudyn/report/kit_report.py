@@ -11,16 +11,23 @@ from PIL import Image
 
 from ..analysis.verdict import Buildable
 from ..drawing.style import figure_bytes
+from ..fabrication.pieces import parts_list_of
 from ..files.files import make_folder, write_bytes
 from ..io.kits import save_kit
 from ..io.results import save_result, save_states
 from ..kit.kinds import part_kind
 from ..search.result import KitResult
-from ..units import in_millimetres, unit_of
+from ..units import unit_of
 from .designs import draw_designs
 from .environment import environment
 from .history import draw_history
-from .kit_cards import design_cards, deviation_rows, percent_explained
+from .kit_cards import (
+    design_cards,
+    deviation_line,
+    deviation_rows,
+    deviation_words,
+    percent_explained,
+)
 from .kit_drawings import (
     drawn_designs,
     final_states,
@@ -33,7 +40,7 @@ from .kit_drawings import (
 from .kit_picture import joined, kit_pictures
 from .page import Drawing, Page
 from .parameters import draw_parameters
-from .part_drawings import part_drawings
+from .part_drawings import PartDrawing, part_drawings, part_rows
 from .verdicts import stopped, verdict_lines, verdict_rows
 from .viewer import save_viewer
 from .viewer_scenes import kit_scene
@@ -111,7 +118,8 @@ def _page(
         first, second = verdict_lines(verdicts, result.units)
         possible = _all_possible(verdicts)
         page = Page(title, f"{first.removesuffix('.')}: {_outcome(result)}" if possible else first)
-        page.text("\n\n".join([second] if possible else _stops(verdicts)))
+        stops = [*_stops(verdicts), deviation_line(result)]
+        page.text("\n\n".join([second] if possible else stops))
     else:
         page = Page(title, about)
     if result.warnings:
@@ -182,23 +190,31 @@ def _parts(page: Page, result: KitResult) -> None:
     """Every part as a drawing, with its measures and how many pieces each design needs."""
     drawings, as_cut = part_drawings(result)
     names = [design.name for design in result.designs]
-    rows = [
-        [
-            one.label,
-            Drawing(one.svg, one.width, f"{one.label}: {one.about}"),
-            one.about,
-            *(one.counts or [None] * len(names)),
-            one.total,
-        ]
-        for one in drawings
-    ]
+    rows = part_rows(drawings, parts_list_of(result))
+    headings = ["part", "drawing", "mm" if as_cut else "measures", *names, "to make"]
     page.section("The parts").drawings(
-        ["part", "drawing", "mm" if as_cut else "measures", *names, "to make"],
-        rows,
+        headings,
+        [_part_row(one, len(names)) for one in rows],
         ("As they are cut, in mm. " if as_cut else "Axes only: no board is known. ")
         + "All at one scale but for the thinnest, which are enlarged. To make: enough for any one "
         "of the designs.",
     )
+    if len(rows) < len(drawings):
+        page.drawings(
+            headings,
+            [_part_row(one, len(names)) for one in drawings],
+            folded=f"All {len(drawings)} pieces that are cut for them",
+        )
+
+
+def _part_row(one: PartDrawing, designs: int) -> list[Any]:
+    return [
+        one.label,
+        Drawing(one.svg, one.width, f"{one.label}: {one.about}"),
+        one.about,
+        *(one.counts or [None] * designs),
+        one.total,
+    ]
 
 
 def _all_possible(verdicts: Sequence[Buildable]) -> bool:
@@ -208,10 +224,7 @@ def _all_possible(verdicts: Sequence[Buildable]) -> bool:
 def _outcome(result: KitResult) -> str:
     """Of how many parts, and how far off the worst design is at most."""
     sizes = " and ".join(f"{count} {kind}" for kind, count in result.kit.sizes.items())
-    fits = [result.summary("assigned", n)["fit"] for n in range(len(result.designs))]
-    percent = max(fit["max_percent"] for fit in fits)
-    length = in_millimetres(max(fit["max"] for fit in fits), result.units)
-    return f"{sizes} parts keep every joint within {percent:.2g} % ({length}) of its target."
+    return f"{sizes} parts keep {deviation_words(result)}."
 
 
 def _stops(verdicts: Sequence[Buildable]) -> list[str]:

@@ -4,6 +4,7 @@ script."""
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -17,7 +18,13 @@ from matplotlib.figure import Figure
 from ..drawing.style import figure_bytes
 from ..files.files import write_text
 from ..files.json_files import to_json
+from ..units import FORCES, LENGTHS, plain_number
 
+# Between a number (or the kind of one) and its unit, which no line's end may part.
+_NUMBER_UNIT = re.compile(
+    r"(?:(?<=\d)|(?<=max)|(?<=mean)) "
+    rf"(?=(?:%|°|{'|'.join([*LENGTHS, *FORCES])}|[kMG]?Pa|m?J|kJ|MJ|s|degrees|deg)(?![\w/]))"
+)
 _MEDIA = {"svg": "image/svg+xml", "png": "image/png"}
 
 
@@ -61,26 +68,26 @@ class Page:
 
     def __init__(self, title: str, lead: str = ""):
         self.title = title
-        self._body = [f"<h1>{escape(title)}</h1>"]
+        self._body = [f"<h1>{_text(title)}</h1>"]
         if lead:
-            self._body.append(f'<p class="lead">{escape(lead)}</p>')
+            self._body.append(f'<p class="lead">{_text(lead)}</p>')
         self._footer = ""
 
     def section(self, heading: str, text: str = "") -> Page:
         """A new section; empty lines in the text start a new paragraph."""
-        self._body.append(f"<h2>{escape(heading)}</h2>")
+        self._body.append(f"<h2>{_text(heading)}</h2>")
         return self.text(text)
 
     def text(self, text: str) -> Page:
         """Paragraphs."""
         self._body += [
-            f"<p>{escape(part.strip())}</p>" for part in text.split("\n\n") if part.strip()
+            f"<p>{_text(part.strip())}</p>" for part in text.split("\n\n") if part.strip()
         ]
         return self
 
     def links(self, files: Mapping[str, str]) -> Page:
         """A line of links to files beside the page: text -> path, relative to the page's folder."""
-        shown = (f'<a href="{escape(path)}">{escape(text)}</a>' for text, path in files.items())
+        shown = (f'<a href="{escape(path)}">{_text(text)}</a>' for text, path in files.items())
         self._body.append(f'<p class="links">{" · ".join(shown)}</p>')
         return self
 
@@ -99,7 +106,7 @@ class Page:
             + "</tr>"
             for row in rows
         )
-        note = f"<caption>{escape(caption)}</caption>" if caption else ""
+        note = f"<caption>{_text(caption)}</caption>" if caption else ""
         self._body.append(
             f'<div class="scroll"><table>{note}<thead><tr>{head}</tr></thead>'
             f"<tbody>{body}</tbody></table></div>"
@@ -112,16 +119,26 @@ class Page:
         return self
 
     def drawings(
-        self, headings: Sequence[str], rows: Sequence[Sequence[Any]], caption: str = ""
+        self,
+        headings: Sequence[str],
+        rows: Sequence[Sequence[Any]],
+        caption: str = "",
+        folded: str = "",
     ) -> Page:
-        """A table of which some values are drawings, see `Drawing`; the others as in `table`."""
+        """A table of which some values are drawings, see `Drawing`; the others as in `table`.
+
+        folded : a line of text that the table is folded away under; "" for one that is open
+        """
         head = "".join(_cell("th", heading, False) for heading in headings)
         body = "".join(f"<tr>{''.join(map(_drawn_cell, row))}</tr>" for row in rows)
-        note = f"<caption>{escape(caption)}</caption>" if caption else ""
-        self._body.append(
+        note = f"<caption>{_text(caption)}</caption>" if caption else ""
+        table = (
             f'<div class="scroll"><table class="drawings">{note}<thead><tr>{head}</tr></thead>'
             f"<tbody>{body}</tbody></table></div>"
         )
+        if folded:
+            table = f"<details><summary>{_text(folded)}</summary>{table}</details>"
+        self._body.append(table)
         return self
 
     def figure(
@@ -131,21 +148,21 @@ class Page:
         content = figure if isinstance(figure, bytes) else figure_bytes(figure, suffix)
         data = base64.b64encode(content).decode("ascii")
         self._body.append(
-            f'<figure><img src="data:{_MEDIA[suffix]};base64,{data}" alt="{escape(alt)}">'
-            f"<figcaption>{escape(caption)}</figcaption></figure>"
+            f'<figure><img src="data:{_MEDIA[suffix]};base64,{data}" alt="{_text(alt)}">'
+            f"<figcaption>{_text(caption)}</figcaption></figure>"
         )
         return self
 
     def details(self, summary: str, data: Any) -> Page:
         """Plain data, such as settings, folded away under a line of text."""
         self._body.append(
-            f"<details><summary>{escape(summary)}</summary><pre>{escape(to_json(data))}</pre></details>"
+            f"<details><summary>{_text(summary)}</summary><pre>{escape(to_json(data))}</pre></details>"
         )
         return self
 
     def footer(self, text: str) -> Page:
         """The page's last line."""
-        self._footer = f"<footer>{escape(text)}</footer>"
+        self._footer = f"<footer>{_text(text)}</footer>"
         return self
 
     def html(self) -> str:
@@ -160,7 +177,7 @@ class Page:
                 '<meta charset="utf-8">',
                 f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
                 '<meta name="viewport" content="width=device-width, initial-scale=1">',
-                f"<title>{escape(self.title)}</title>",
+                f"<title>{_text(self.title)}</title>",
                 f"<style>\n{css}</style>",
                 "</head>",
                 "<body>",
@@ -177,6 +194,11 @@ class Page:
         return write_text(path, self.html(), overwrite=overwrite)
 
 
+def _text(text: str) -> str:
+    """Plain text as HTML has it; numbers stay beside their units."""
+    return escape(_NUMBER_UNIT.sub("\N{NO-BREAK SPACE}", text))
+
+
 def shown(value: Any) -> str:
     """A table's value as text."""
     if value is None:
@@ -185,7 +207,7 @@ def shown(value: Any) -> str:
         return "yes" if value else "no"
     if isinstance(value, Integral):
         return f"{value:,}"
-    return f"{value:.4g}" if isinstance(value, Real) else str(value)
+    return plain_number(float(value)) if isinstance(value, Real) else str(value)
 
 
 def _card(card: Card) -> str:
@@ -193,14 +215,14 @@ def _card(card: Card) -> str:
     image = '<div class="missing">no equilibrium</div>'
     if card.picture is not None:
         data = base64.b64encode(card.picture).decode("ascii")
-        image = f'<img src="data:image/png;base64,{data}" alt="{escape(card.alt)}">'
+        image = f'<img src="data:image/png;base64,{data}" alt="{_text(card.alt)}">'
     lines = "".join(
-        f"<dt>{escape(name)}</dt>{'<dd class=bad>' if bad else '<dd>'}{escape(value)}</dd>"
+        f"<dt>{_text(name)}</dt>{'<dd class=bad>' if bad else '<dd>'}{_text(value)}</dd>"
         for name, value, bad in card.lines
     )
     return (
-        f'<article><div class="card">{image}<div class="text"><h3>{escape(card.title)} '
-        f'<span class="badge {kind}">{escape(card.badge)}</span></h3><dl>{lines}</dl>'
+        f'<article><div class="card">{image}<div class="text"><h3>{_text(card.title)} '
+        f'<span class="badge {kind}">{_text(card.badge)}</span></h3><dl>{lines}</dl>'
         "</div></div></article>"
     )
 
@@ -210,7 +232,7 @@ def _drawn_cell(value: Any) -> str:
         data = base64.b64encode(value.svg.encode()).decode("ascii")
         return (
             f'<td class="drawing"><img src="data:image/svg+xml;base64,{data}" '
-            f'width="{value.width:.0f}" alt="{escape(value.alt)}"></td>'
+            f'width="{value.width:.0f}" alt="{_text(value.alt)}"></td>'
         )
     return _cell("td", shown(value), _is_number(value))
 
@@ -221,4 +243,4 @@ def _is_number(value: Any) -> bool:
 
 def _cell(tag: str, text: str, right: bool) -> str:
     kind = ' class="number"' if right else ""
-    return f"<{tag}{kind}>{escape(text)}</{tag}>"
+    return f"<{tag}{kind}>{_text(text)}</{tag}>"

@@ -3,7 +3,7 @@ design needs."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,6 +56,46 @@ def part_drawings(result: KitResult) -> tuple[list[PartDrawing], bool]:
     except InputError:
         return list(_drawn(_axes(parts), parts)), False
     return list(_drawn(shapes, parts)), True
+
+
+def part_rows(drawings: Sequence[PartDrawing], parts: PartsList) -> list[PartDrawing]:
+    """A row for each part: the pieces that are made for one part, such as the boards of a cell's
+    arms, become one row with the largest of them drawn; its counts are those of the part."""
+    kinds = {
+        label: (kind, k) for kind, labels in parts.labels.items() for k, label in enumerate(labels)
+    }
+    groups: dict[str, list[PartDrawing]] = {}
+    for one in drawings:
+        part = one.label.split(" ")[0]
+        groups.setdefault(part if part in kinds else one.label, []).append(one)
+    rows = []
+    for label, pieces in groups.items():
+        if len(pieces) == 1:
+            rows += pieces
+            continue
+        kind, k = kinds[label]
+        widest = max(pieces, key=lambda one: one.width)
+        rows.append(
+            PartDrawing(
+                label,
+                f"{len(pieces)} boards, {_together([one.about for one in pieces])}",
+                widest.svg,
+                widest.width,
+                tuple(int(n) for n in parts.counts[kind][:, k]),
+                int(parts.needed()[kind][k]),
+            )
+        )
+    return rows
+
+
+def _together(texts: Sequence[str]) -> str:
+    """ "32.0 and 33.5 from pin to pin" of several texts that differ in their first word."""
+    different = list(dict.fromkeys(texts))
+    ends = {text.partition(" ")[2] for text in different}
+    if len(ends) > 1:
+        return "; ".join(different)
+    firsts = [text.partition(" ")[0] for text in different]
+    return f"{' and '.join(firsts)} {ends.pop()}"
 
 
 def _drawn(shapes: Iterable[Template], parts: PartsList) -> Iterable[PartDrawing]:

@@ -187,7 +187,8 @@ def _margins(verdicts: Sequence[Buildable], units: Units | None) -> str:
     found = []
     moved = [v.moved_percent for v in verdicts if v.moved_percent is not None]
     if moved:
-        found.append("opened from the assembly they end in the shape shown")
+        ends = "they end" if len(verdicts) > 1 else "it ends"
+        found.append(f"opened from the assembly {ends} in the shape shown")
     used = [v.largest for v in verdicts if v.largest is not None]
     if used:
         found.append(f"stress is at most {100 * max(used):.0f} % of the elastic limit")
@@ -205,7 +206,8 @@ def _margins(verdicts: Sequence[Buildable], units: Units | None) -> str:
     if any(verdict.loads for verdict in verdicts):
         found.append("all load cases are carried")
     if all(verdict.fabrication is not None for verdict in verdicts):
-        found.append("their parts have room for their holes")
+        whose = "their" if len(verdicts) > 1 else "its"
+        found.append(f"{whose} parts have room for their holes")
     sentence = ", ".join(found)
     return f"{sentence[:1].upper()}{sentence[1:]}." if sentence else ""
 

@@ -26,7 +26,7 @@ from ..structures.stacking import (
     stacked_groups,
     stacked_parameters,
 )
-from ..units import common_units, unnamed_units
+from ..units import common_units, unit_of, unnamed_units
 from .checkpoints import NoStore, Store
 from .dataset import Dataset
 from .events import UNRELAXED, Observer, StageEvent
@@ -278,8 +278,10 @@ def _lacks(missing: Sequence[Missing], designs: Sequence[Design], stock: Stock) 
         text = f"{one.number} {one.kind} pieces are missing for {whose}"
         if one.copies is not None:
             parts = stock.kit[one.kind]
+            quantity = "angle" if part_kind(one.kind).angular else "length"
+            unit = unit_of(quantity, stock.kit.units)
             best = ", ".join(
-                f"{count} of ({', '.join(f'{value:.6g}' for value in parts[k])})"
+                f"{count} of ({', '.join(f'{value:.6g}' for value in parts[k])}) {unit}"
                 for k, count in enumerate(one.copies)
                 if count
             )

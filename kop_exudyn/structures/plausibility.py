@@ -7,13 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..rods.sections import Material
-from ..units import Units
+from ..units import Units, plain_number
 from .base import Design
 from .strength import materials_of
 
 _THICK, _THIN = 0.5, 2e-4  # section over span, beyond which rods are no rods
 _YOUNG = (1e5, 2e12)  # Pa: from foam to carbon fibre
 _DENSITY = (1.0, 3e4)  # kg / m^3
+_STRETCHY = 10.0  # elastic limit over modulus: no material stretches that far
 
 
 def section_doubt(sides: Sequence[float], spans: np.ndarray, units: Units | None) -> str | None:
@@ -44,7 +45,13 @@ def material_doubts(materials: Sequence[Material], units: Units | None) -> list[
         if not _YOUNG[0] <= modulus <= _YOUNG[1]:
             found.append(
                 f"a Young's modulus of {material.young:g} is {modulus:.3g} Pa in {units}: is it "
-                "in these units?"
+                f"in these units?{_meant(material.young, _YOUNG, 'Pa', units.stress_si(1.0))}"
+            )
+        limit = material.elastic_limit
+        if limit is not None and limit > _STRETCHY * material.young:
+            found.append(
+                f"an elastic limit of {limit:g} is {plain_number(limit / material.young, 3)} times "
+                f"Young's modulus of {material.young:g}: are both in {units}?"
             )
         if material.density is not None:
             density = units.density_si(material.density)
@@ -52,8 +59,19 @@ def material_doubts(materials: Sequence[Material], units: Units | None) -> list[
                 found.append(
                     f"a density of {material.density:g} is {density:.3g} kg/m³ in {units}: is it "
                     "in these units?"
+                    f"{_meant(material.density, _DENSITY, 'kg/m³', units.density_si(1.0))}"
                 )
     return found
+
+
+def _meant(value: float, likely: tuple[float, float], unit: str, si: float) -> str:
+    """What a number would be if it was given in SI units, where it is a likely one in these.
+
+    si : of one unit of the design
+    """
+    if not likely[0] <= value <= likely[1]:
+        return ""
+    return f" {value:g} {unit} would be {value / si:g}"
 
 
 def design_doubts(design: Design) -> list[str]:

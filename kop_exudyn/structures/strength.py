@@ -32,6 +32,16 @@ from .base import Design
 
 TRANSVERSE = 1.5  # largest over mean shear stress of a transverse force
 _SAME_STIFFNESS = 1e-9  # relative
+_ROUNDING = 1e-6  # of a limit: a search that keeps to one may end on it
+
+
+def beyond_limit(value: float | None, limit: float = 1.0) -> bool:
+    """Whether a value is larger than its limit by more than rounding; one that isn't known is
+    not.
+
+    value : such as a utilisation, times the safety factor
+    """
+    return value is not None and value > limit * (1 + _ROUNDING)
 
 
 @dataclass(frozen=True)

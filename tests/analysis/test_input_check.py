@@ -73,5 +73,5 @@ def test_problems_in_words():
     assert "125 % of the elastic limit (deployed)" in stressed.problems[1]
     assert "80 % of it would just do" in stressed.problems[1]
     fitted = dataclasses.replace(stressed, fitted_percent=0.4)
-    assert "fit_input alone brings that to 0.4 %" in fitted.problems[0]
+    assert "could bring that to 0.4 %" in fitted.problems[0]
     assert DesignCheck("two", failed="why").problems == ["doesn't open: why"]

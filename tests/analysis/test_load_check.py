@@ -3,11 +3,14 @@ thickness that carries a load."""
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from support.grids import coarse_grid
 
 from kop_exudyn.analysis.load_check import carrying_thickness, check_load, critical_factor
+from kop_exudyn.analysis.mending import about_loads
 from kop_exudyn.equilibrium.path import PathOptions, trace_path
 from kop_exudyn.errors import InputError
 from kop_exudyn.scene.loads import DeadForces
@@ -87,11 +90,34 @@ def test_limits_on_the_deflection(dome, opened):
     for limit, kept in (
         (DeflectionLimit(absolute=1.01 * moved), True),
         (DeflectionLimit(absolute=0.99 * moved), False),
+        # a search that keeps to the limit may end on it, but for rounding
+        (DeflectionLimit(absolute=moved * (1 - 2e-9)), True),
+        (DeflectionLimit(absolute=moved * (1 - 1e-5)), False),
         (DeflectionLimit(span_over=0.99 * span / moved), True),
         (DeflectionLimit(span_over=1.01 * span / moved), False),
         (DeflectionLimit(absolute=1.01 * moved, span_over=1.01 * span / moved), False),
     ):
         assert check_load(dome, opened, pushed(1.0, deflection=limit)).carried() is kept
+
+
+@pytest.mark.parametrize("over, carried", [(1 + 3e-10, True), (1 + 1e-5, False)])
+def test_stress_may_end_on_its_limit_but_for_rounding(dome, opened, over, carried):
+    """What the search brings to its bound is carried; what is a little beyond it is told so that
+    the numbers differ."""
+    check = check_load(dome, opened, pushed(1.0))
+    safety = over / check.utilisation
+    assert check.carried(safety) is carried
+    for told in about_loads(dome, opened, [check], safety):
+        assert not carried and "stressed to 100.001 % of its elastic limit" in told.why
+
+
+def test_a_deflection_just_beyond_its_limit_is_told_apart(dome, opened):
+    check = check_load(dome, opened, pushed(1.0))
+    limit = DeflectionLimit(absolute=check.deflection * (1 - 1e-4))
+    check = check_load(dome, opened, pushed(1.0, deflection=limit))
+    (stop,) = about_loads(dome, opened, [check])
+    moved, allowed = re.search(r"deflects by (\S+) .*?\((\S+) ", stop.why).groups()
+    assert moved != allowed
 
 
 def test_the_thickness_that_carries_a_load_carries_it(data, dome, opened, first_bifurcation):

@@ -274,6 +274,17 @@ class TestCommand:
         assert {strand.head for strand in design.network.strands} != {0.0}
         assert json.loads(out.read_text())["material"]["elastic_limit"] == 4e7
 
+    def test_it_is_told_without_any_file_to_write(self, obj, capsys):
+        assert main(["import", str(obj)]) == 0
+        assert "joints     6" in capsys.readouterr().out
+
+    def test_a_surface_is_no_drawing(self, tmp_path, capsys):
+        """An OBJ file of faces alone: what it needs is said, not what a C-shell would need."""
+        mesh = tmp_path / "hill.obj"
+        mesh.write_text("v -5 -5 0\nv 5 -5 0\nv 0 5 0\nf 1 2 3\n")
+        assert main(["import", str(mesh), "--out", str(tmp_path / "a.json")]) == 2
+        assert "needs --patch" in capsys.readouterr().err
+
     def test_a_mesh_to_keep_to(self, obj, tmp_path, repository, capsys):
         (tmp_path / "designs").mkdir()
         mesh, out = tmp_path / "meshes" / "hill.obj", tmp_path / "designs" / "net.json"
@@ -318,8 +329,10 @@ class TestCommand:
             ((), "a C-shell needs --opening"),
             (OPTIONS[:2], "a C-shell needs --section"),
             ((*OPTIONS, "--as", "umbrella"), "an umbrella mesh on a surface needs --patch"),
-            ((*OPTIONS, "--material", "1,0.7"), "material.poisson = 0.7: "),
-            ((*OPTIONS, "--opening", "9"), "opening.angle = 9.0"),
+            ((*OPTIONS, "--material", "1,0.7"), "--material = 0.7: "),
+            ((*OPTIONS, "--opening", "9"), "--opening = 9.0: must be smaller than 3.14159"),
+            ((*OPTIONS, "--opening", "35"), "35 degrees are 35deg"),
+            ((*OPTIONS[2:], "--as", "grid", "--held", "edge"), "a grid needs --surface"),
             (
                 (*OPTIONS, "--opening", "wide"),
                 "expected an angle in radians, or as 35deg, got 'wide'",
@@ -413,3 +426,19 @@ class TestGrids:
         )
         error = capsys.readouterr().err
         assert message in error and error.count("\n") == 1 and not (tmp_path / "out.json").exists()
+
+
+def test_a_gap_between_ends_is_told_once():
+    """Two pairs of finely drawn arcs whose ends stop short of each other: one doubt a place, as
+    many as there are places to look at."""
+    size, gap, t = 2000.0, 4.0, np.linspace(0, 1, 60)
+    curves = []
+    for c in (0.0, 500.0, 1000.0):
+        curves.append(np.stack([size * t, c + 60 * np.sin(3 * t), 0 * t], axis=1))
+        curves.append(np.stack([800 + c + 40 * np.sin(3 * t), -300 + 1600 * t, 0 * t], axis=1))
+    corner = curves[0][-1] + [0.7 * gap, 0.7 * gap, 0]
+    curves.append(np.stack([corner[0] + 100 * t, corner[1] + 900 * t, 0 * t], axis=1))
+    drawn = [DrawnCurve(points, False, f"arc {n}") for n, points in enumerate(curves)]
+    net = drawn_network(Drawing(drawn), ReadingOptions())
+    doubts = [finding.text for finding in net.findings if "a joint may be meant" in finding.text]
+    assert len(doubts) == 1 and "arc 0" in doubts[0] and "arc 6" in doubts[0]

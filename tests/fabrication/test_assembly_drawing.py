@@ -1,5 +1,6 @@
 """Assembly drawings: every piece is labelled, at its place."""
 
+import re
 from collections import Counter
 
 import numpy as np
@@ -9,8 +10,14 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from kop_exudyn.drawing.labels import Label, place
 from kop_exudyn.errors import InputError
-from kop_exudyn.fabrication.assembly_drawing import assembly_drawing, assembly_pages, draw_assembly
-from kop_exudyn.fabrication.paper import Book
+from kop_exudyn.fabrication.assembly_drawing import (
+    _tiles,
+    assembly_drawing,
+    assembly_pages,
+    draw_assembly,
+    explanation,
+)
+from kop_exudyn.fabrication.paper import SCALES, Book, Page
 from kop_exudyn.fabrication.pieces import parts_list
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.kit.cluster import cluster
@@ -49,7 +56,7 @@ def texts_of(drawing):
 
 def test_every_piece_and_joint_has_its_label(shell, parts):
     texts = texts_of(assembly_drawing(parts, "shell", "m"))
-    labels = Counter(text.split("·")[0].lstrip("-") for text in texts)
+    labels = Counter(text.split("·")[0] for text in texts)
     wanted = Counter(parts.label(piece) for piece in parts.designs[0].pieces)
     assert {label: labels[label] for label in wanted} == wanted
     linear = [piece.element for piece in parts.designs[0].pieces if piece.kind == "linear"]
@@ -60,7 +67,7 @@ def test_every_piece_and_joint_has_its_label(shell, parts):
     flipped = sum(
         piece.values[0] < 0 for piece in parts.designs[0].pieces if piece.kind == "angular"
     )
-    assert sum(text.startswith("-") for text in texts) == flipped > 0
+    assert sum(text.endswith("·f") for text in texts) == flipped > 0
     assert {f"({k})" for k in range(1, 6)} <= set(texts)  # lamellas
 
 
@@ -97,8 +104,8 @@ def test_drawing_keeps_proportions_and_handedness(shell, parts):
     assert np.linalg.det(step) == pytest.approx(np.linalg.det(wanted))
 
 
-def lattice(across, down):
-    """An umbrella mesh over a parallelogram of triangles."""
+def lattice(across, down, wanted=lambda i, j: True):
+    """An umbrella mesh over a parallelogram of triangles, or over the wanted ones of its rhombi."""
     s = np.sqrt(3) / 2
     points = [[40 * (i + j / 2), 40 * s * j] for j in range(down + 1) for i in range(across + 1)]
     n = across + 1
@@ -106,7 +113,10 @@ def lattice(across, down):
     for j in range(down):
         for i in range(across):
             a = j * n + i
-            faces += [[a, a + 1, a + n], [a + 1, a + n + 1, a + n]]
+            if wanted(i, j):
+                faces += [[a, a + 1, a + n], [a + 1, a + n + 1, a + n]]
+    used, numbers = np.unique(faces, return_inverse=True)
+    points, faces = np.array(points)[used].tolist(), numbers.reshape(-1, 3).tolist()
     lengths = [[32 + k % 5, 33 + k % 3] for k in range(len(faces))]
     return design_from_dict(
         {
@@ -158,6 +168,75 @@ def test_a_large_drawing_is_split_into_pages_that_show_everything():
         text for page in others for text in {t.get_text() for t in page.ax.texts} if "\n" in text
     )
     assert len(shown) == 256
+
+
+def test_pages_that_show_nothing_are_left_out():
+    """An L of cells: of the pages that cover its box, those in its empty corner aren't printed, and
+    the others have all cells."""
+    design = lattice(44, 44, lambda i, j: min(i, j) < 1)
+    found = cluster(design.groups, design.parameters, {"cell": 2})
+    parts = parts_list(found.kit, found.assignment, [design])
+    drawing = assembly_drawing(parts, "lattice", "mm")
+    book = Book("a4", "lattice")
+    assembly_pages(book, drawing)
+    first, *others = book.pages
+    texts = [{t.get_text() for t in page.ax.texts if "\n" in t.get_text()} for page in others]
+    assert all(texts) and len(set.union(*texts)) == design.n_elements
+    inner = Page("a4", "").room - [12.0, 18.0]
+    counts, _ = _tiles(np.ptp(drawing.box, axis=0), inner, drawing.scale)
+    assert 1 < len(others) < counts.prod()
+    assert first.heading.endswith(f"where its {len(others)} pages are")
+    notes = " ".join(page.ax.texts[-1].get_text() for page in others)
+    beside = re.findall(r"(?:left|right|above|below) (\d+)", notes)
+    assert {int(word) for word in beside} <= set(range(1, len(others) + 1))
+
+
+@pytest.mark.parametrize("asked", [1.0, 2.0, 5.0, 10.0, 50.0])
+def test_as_large_as_the_pages_allow(asked):
+    """On as many pages as a scale needs, the drawing could not be larger."""
+    size, inner = np.array([2900.0, 1700.0]), np.array([259.0, 160.0])
+    counts, scale = _tiles(size, inner, asked)
+    assert scale <= asked
+    larger = [s for s in SCALES if s < scale]
+    for s, wanted in ((scale, True), *((s, False) for s in larger[-1:])):
+        fits = (size / s + 14.0 - 12.0 <= counts * inner + 1e-9).all()
+        assert bool(fits) is wanted
+
+
+@pytest.mark.parametrize("height", [-0.5, 0.5])
+def test_corners_of_upright_lamellas_say_which_way_they_bend(height):
+    """The drawing is a plan, so it can't show what the legend says instead: corners as drawn bend
+    so that the lamella rises towards the reader at its ends, flipped ones so that it falls."""
+    design = design_from_dict(
+        {
+            "class": "grid",
+            "name": "grid",
+            "material": {"young": 2.1e9, "poisson": 0.35},
+            "section": {"type": "rectangle", "width": 0.004, "height": 0.03},
+            "surface": {"type": "analytic", "name": "paraboloid", "a": height, "b": 0.6 * height},
+            "network": {"type": "isolines", "u": [-0.6, 0.0, 0.5], "v": [-0.5, 0.1, 0.6]},
+        }
+    )
+    found = cluster(design.groups, design.parameters, {"linear": 2, "angular": 1})
+    parts = parts_list(found.kit, found.assignment, [design])
+    drawing = assembly_drawing(parts, "grid", "m")
+    assert "rises towards you" in explanation(drawing.placed)
+    placed, state = drawing.placed, drawing.placed.scene.initial
+    towards_reader = state.rotations[design.joints][:, :, 2].mean(axis=0)
+    flipped = 0
+    for corner in placed.corners.values():
+        piece = placed.corner_pieces[corner.body]
+        ends = [
+            state.positions[int(body)] - state.positions[corner.body]
+            for chain in (*corner.before, *corner.after)
+            for body in placed.ends[chain]
+            if int(body) != corner.body
+        ]
+        rise = float(np.mean(ends, axis=0) @ towards_reader)
+        assert np.sign(rise) == np.sign(piece.values[0])
+        flipped += piece.values[0] < 0
+    texts = texts_of(drawing)
+    assert sum(text.endswith("·f") for text in texts) == flipped
 
 
 def test_labels_that_find_no_place_are_counted():

@@ -1,11 +1,18 @@
 """Pages of parts for the workshop, on every paper."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from kop_exudyn.fabrication.blanks import Blanks
+from kop_exudyn.fabrication.cutsheets import cut_sheets
+from kop_exudyn.fabrication.options import CutOptions
 from kop_exudyn.fabrication.paper import PAPERS, SCALES, Book, Page
-from kop_exudyn.fabrication.part_pages import plate_pages, strip_pages
+from kop_exudyn.fabrication.part_pages import plate_pages, sheet_pages, stock_pages, strip_pages
+from kop_exudyn.fabrication.shapes import CUT, Text
+from kop_exudyn.fabrication.stock import Bar, StockPlan
+from kop_exudyn.fabrication.templates import strip_template
 
 
 @pytest.mark.parametrize("paper", PAPERS)
@@ -28,3 +35,53 @@ def test_parts_are_drawn_as_large_as_the_paper_allows(paper, parts):
     plate_pages(book, blanks)
     size = np.max([2 * plate.leg for plate in blanks.plates])
     assert size / book.pages[0].scale > 20.0  # mm of the paper
+
+
+def texts(book):
+    return [text.get_text() for page in book.pages for text in page.ax.texts]
+
+
+def test_bars_that_are_alike_are_drawn_once(parts):
+    blanks, book = Blanks(parts, "m", CutOptions(stock=(2400.0,))), Book("a4", "kit")
+    plan = StockPlan(
+        (Bar(9.0, (("L1", 4.0),), 5.0),) * 20 + (Bar(9.0, (("L2", 8.0),), 1.0),), 189.0
+    )
+    stock_pages(book, blanks, plan)
+    told = texts(book)
+    assert "1–20" in told and "20 alike, left 5" in told and "21" in told and len(book.pages) == 1
+    assert sum("4.0" in text or text == "L1" for text in told) == 1
+
+
+def test_sheets_that_are_alike_are_on_one_page(parts):
+    sheets = cut_sheets(Blanks(parts, "m"))
+    first, last = (replace(sheets[0], title=f"cut sheet {n} of 3") for n in (1, 2))
+    shapes = list(sheets[0].shapes)
+    del shapes[next(k for k, shape in enumerate(shapes) if shape.layer == CUT)]
+    other = replace(sheets[0], shapes=tuple(shapes), title="cut sheet 3 of 3")
+    book = Book("a4", "kit")
+    sheet_pages(book, [first, last, other])
+    headings = [page.heading for page in book.pages]
+    assert len(headings) == 2
+    assert headings[0].startswith("cut sheets 1 to 2 of 3, alike, ")
+    assert headings[1].startswith("cut sheet 3 of 3, ")
+
+
+def test_plates_can_be_laid_out_by_a_square(parts):
+    blanks, book = Blanks(parts, "m"), Book("a3", "kit")
+    plate_pages(book, blanks)
+    for plate in blanks.plates:
+        aside = abs(plate.leg * np.sin(plate.angle))
+        assert any(f"the second axis ends {aside:.1f} mm off the first" in t for t in texts(book))
+
+
+def test_names_on_strips_keep_off_their_joint_holes(parts):
+    for hole in (4.0, 9.0):
+        for strip in Blanks(parts, "m", CutOptions(joint_hole=hole, corners=False)).strips:
+            half = strip.board.breadth / 2
+            (label,) = (
+                shape
+                for shape in strip_template(strip).shapes
+                if isinstance(shape, Text) and shape.text == strip.label
+            )
+            top, bottom = label.at[1] + label.height / 2, label.at[1] - label.height / 2
+            assert -half < bottom and top < -strip.hole / 2

@@ -1,5 +1,6 @@
 """What stops a kit from being cut: the verdicts that came with the result, and the parts."""
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -37,4 +38,8 @@ def test_parts_are_asked_anew_with_the_options_at_hand(shells, parts):
     for words in ("joint hole of 11 mm", "longer than the longest bar", "larger than a sheet's"):
         assert any(words in sentence for sentence in found)
     assert all(sentence.startswith("part ") for sentence in found)
+    # the sheet that is named holds every part
+    named = re.search(r"--sheet (\d+),(\d+)", next(s for s in found if "--sheet" in s))
+    larger = replace(small, sheet=(float(named[1]), float(named[2])))
+    assert not any("--sheet" in s for s in obstacles(result, Blanks(parts, "m", larger)))
     assert len(obstacles(result, Blanks(parts, "m", replace(small, stock=())))) < len(found)

@@ -15,7 +15,7 @@ from kop_exudyn.io.results import load_result, load_states
 from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.kit.parts import Kit
 from kop_exudyn.kit.stock import Stock
-from kop_exudyn.report.kit_cards import deviation_rows
+from kop_exudyn.report.kit_cards import deviation_rows, deviation_words
 from kop_exudyn.report.kit_drawings import drawn_designs, histories, part_spaces
 from kop_exudyn.report.kit_run import optimize_and_report
 from kop_exudyn.report.part_drawings import part_drawings
@@ -103,7 +103,12 @@ def test_the_page_begins_with_pictures_and_parts(finished):
     assert page[cards:parts].count('<article><div class="card"><img') == len(result.designs)
     for n, design in enumerate(result.designs):
         fit = result.summary("assigned", n)["fit"]
-        assert f"<h3>{design.name} " in page and f"at most {fit['max_percent']:.2g} %" in page
+        assert f"<h3>{design.name} " in page and f"at most {fit['max_percent']:.2g}\xa0%" in page
+    # the pieces between joints are farther off than these: the first sentence says so
+    words = deviation_words(result)
+    assert "the rods between them within" in words
+    worst = max(result.summary("assigned", n)["fit"]["pieces_max_percent"] for n in (0, 1))
+    assert f"{worst:.2g} %" in words
     drawings, as_cut = part_drawings(result)
     assert not as_cut  # the toys name no units
     assert [one.label for one in drawings] == ["A1", "A2", "L1", "L2", "L3"]

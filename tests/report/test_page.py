@@ -65,7 +65,7 @@ def test_well_formed_and_complete(page):
         "–",
         "yes",
         "</pre>",
-        "Took 3 s.",
+        "Took 3\xa0s.",
     ):
         assert piece in text
 
@@ -97,10 +97,26 @@ def test_saving(page, tmp_path):
         (0.000123456, "0.0001235"),
         ("x", "x"),
         (2.0, "2"),
+        (12345.6, "12350"),
     ],
 )
 def test_values(value, text):
     assert shown(value) == text
+
+
+def test_numbers_stay_beside_their_units():
+    """No line's end parts them; words stay apart as they were."""
+    text = "within 0.14 % (1.65 mm), max % of 3 samples, 5 MPa, 12 minutes, 7 parts"
+    html = Page("Within 3 %", text).html()
+    for joined in ("0.14 %", "1.65 mm", "max %", "5 MPa", "3 %"):
+        assert joined.replace(" ", "\N{NO-BREAK SPACE}") in html and joined not in html
+    for apart in ("% of", "3 samples", "12 minutes", "7 parts"):
+        assert apart in html
+
+
+def test_tables_can_be_folded_away():
+    page = Page("x").drawings(["part"], [["A"]], folded="All 3 boards")
+    assert "<details><summary>All 3 boards</summary>" in page.html()
 
 
 def test_environment_says_versions_but_not_whose_machine():

@@ -75,7 +75,7 @@ def test_the_smallest_kit_and_its_report(tmp_path, monkeypatch):
     data = load_result(tmp_path / "result.json")
     assert data["settings"]["max_deviation"] == 50.0 and len(data["kit"]["linear"]) == 1
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
-    assert "The smallest kit found that keeps every design within 50 %" in page
+    assert "The smallest kit found that keeps every design within 50\xa0%" in page
     assert len(shown(tmp_path)) == 2 and len(looked) == 1  # at the inputs, of both searches
     assert all(design["input"]["buildable"]["verdict"] for design in data["designs"])
 

@@ -235,6 +235,8 @@ def test_unusable_loads(dome, opened, c_shell_data):
     [
         ({"loads": {"gravity": [0, 0]}}, "loads.gravity.*must have at least 3"),
         ({"loads": {"wind": 1}}, "loads.wind: unknown field"),
+        # the unknown one is named, not one that is known
+        ({"loads": {"gravity": [0, 0, -9.81], "suports": [1]}}, "suports: .*mean 'supports'"),
         ({"loads": {"points": [{"joint": 1}]}}, r"loads.points\[0\].force: is missing"),
         ({"supports": [1, 2]}, "supports.*at least 3"),
     ],
@@ -242,6 +244,14 @@ def test_unusable_loads(dome, opened, c_shell_data):
 def test_fields_of_the_design_file(c_shell_data, write_json_file, change, message):
     with pytest.raises(InputError, match=message):
         load_design(write_json_file("design.json", c_shell_data | change))
+
+
+def test_supports_may_stand_beside_the_loads_or_among_them(c_shell_data):
+    held = {"supports": [0, 1, 2]}
+    loads = {"gravity": [0, 0, -9.81]}
+    (beside,) = design_from_dict(c_shell_data | {"loads": loads} | held).load_cases
+    (among,) = design_from_dict(c_shell_data | {"loads": loads | held}).load_cases
+    np.testing.assert_array_equal(among.supports, beside.supports)
 
 
 def test_command_line(repository, capsys):

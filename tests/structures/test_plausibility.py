@@ -39,6 +39,16 @@ def test_materials(units, young, density, doubts):
     assert len(material_doubts([Material(young, 0.3, density)], units)) == doubts
 
 
+def test_what_was_meant_is_said():
+    """Numbers of metres in a design of millimetres: what they would be there."""
+    material = Material(1.1e10, 0.3, 450.0, elastic_limit=2.4e7)
+    words = material_doubts([material], Units("mm", "N"))
+    assert "1.1e+10 Pa would be 11000" in words[0]
+    assert "450 kg/m³ would be 4.5e-10" in words[-1]
+    mixed = material_doubts([Material(11000.0, 0.3, elastic_limit=2.4e7)], Units("mm", "N"))
+    assert len(mixed) == 1 and "2180 times Young's modulus" in mixed[0]
+
+
 @pytest.mark.parametrize("name", ["small/01_sinh", "grids/01_dome", "umbrellas/dome"])
 def test_the_models_are_not_questioned(name, repository):
     assert design_doubts(load_design(repository / "models" / f"{name}.json")) == []

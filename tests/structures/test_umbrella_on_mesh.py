@@ -73,8 +73,15 @@ def test_compas_meshes_give_the_same_design(surface, write_json_file):
     "options, message",
     [
         ((), "an umbrella mesh on a surface needs --patch"),
-        (("--patch", "circle,3"), "patch = 'circle': unknown shape"),
-        (("--patch", "hexagon,3,4"), "patch = [3, 4]: a hexagon needs 1 positive number of cells"),
+        (("--patch", "circle,3"), "--patch = 'circle': unknown shape"),
+        (("--patch", "hexa,3"), "did you mean 'hexagon'?"),
+        (("--patch", "hexagon,2", "--unit", "m"), "umbrella meshes are in mm"),
+        (("--patch", "hexagon,2", "--layer", "a"), "--layer: isn't for this import"),
+        (("--patch", "hexagon,2", "--elastic-limit", "1,2,3"), "expected one limit, or"),
+        (
+            ("--patch", "hexagon,3,4"),
+            "--patch = [3, 4]: a hexagon needs 1 positive number of cells",
+        ),
         (("--patch", "hexagon,500"), "2000 in all at most"),
         # metres taken for millimetres
         (("--patch", "hexagon,2"), "the base mesh reaches beyond the surface"),

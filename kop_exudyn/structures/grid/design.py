@@ -116,7 +116,7 @@ class Grid(Design):
                 if self.held is not None
                 else (
                     "; a grid that nothing holds may shear without resistance, as on a dome: see "
-                    'the field "held"'
+                    'the field "held" (kop import --held)'
                 )
             )
             raise SimulationFailure(f"{failure.reason}{hint}", where="deployed state") from None

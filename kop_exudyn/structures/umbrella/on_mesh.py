@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
+from ...errors import InputError, did_you_mean
 from ...geometry.mesh_files import read_mesh
 from ...geometry.mesh_surface import is_disc
 from ...geometry.triangles import TriangleSurface
@@ -49,7 +49,11 @@ def umbrella_on_mesh(
     """
     shape, counts = patch
     if shape not in PATCHES:
-        raise InputError(f"unknown shape (known: {', '.join(PATCHES)})", field="patch", value=shape)
+        raise InputError(
+            f"unknown shape ({did_you_mean(shape, PATCHES)}known: {', '.join(PATCHES)})",
+            field="patch",
+            value=shape,
+        )
     make, wanted = PATCHES[shape]
     if len(counts) != wanted or min(counts) < 1 or 6 * max(counts) ** 2 > _MOST_CELLS:
         raise InputError(
