@@ -372,14 +372,15 @@ def _reading(args: argparse.Namespace) -> ReadingOptions:
 
 
 def _write(args: argparse.Namespace, made: Imported) -> None:
-    from ..exchange.polygons import write_surface
+    from ..exchange.polygons import write_mesh_obj
     from ..files.files import check_output_file
     from ..files.json_files import write_json
 
     for path in made.meshes:
         check_output_file(path, overwrite=args.overwrite)
+    unit = made.data.get("units", {}).get("length")
     for path, (vertices, faces) in made.meshes.items():
-        write_surface(path, vertices, faces, overwrite=args.overwrite)
+        write_mesh_obj(path, vertices, faces, unit=unit, overwrite=args.overwrite)
     write_json(args.out, made.data, overwrite=args.overwrite)
 
 

@@ -3,6 +3,7 @@ see `dxf_curves` and `rhino_curves`."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from ..errors import InputError
 from ..files.files import read_bytes
 from ..geometry.nurbs import spline_points
 from ..geometry.obj_files import ObjContent, parse_obj
+from ..units import LENGTHS
 from .drawing import SAG, Drawing, DrawnCurve
 from .dxf_curves import dxf_drawing
 from .other_formats import is_really
@@ -19,6 +21,18 @@ from .rhino_curves import rhino_drawing
 
 _SIZE_LIMIT = 64 * 2**20  # bytes: nets have some thousand points
 _MOST_CURVES = 20_000
+_HEAD = 4096  # bytes of an OBJ file in which its unit may be said
+_UNIT_COMMENT = re.compile(r"\s*#\s*(?:file\s+)?units?\s*[:=]\s*([a-z]+)", re.IGNORECASE)
+_UNIT_WORDS = {
+    "millimeters": "mm",
+    "millimetres": "mm",
+    "centimeters": "cm",
+    "centimetres": "cm",
+    "meters": "m",
+    "metres": "m",
+    "inches": "in",
+    "feet": "ft",
+}
 _WITH_LAYERS = (".dxf", ".3dm")
 
 
@@ -87,7 +101,20 @@ def _obj_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
     skipped = [f"{n} {name} elements" for name, n in found.left_out.items()]
     if found.faces:
         skipped.append(f"{len(found.faces)} faces, which are a surface's: --edges reads them")
-    return Drawing(curves, skipped=skipped)
+    unit = _said_unit(content)
+    return Drawing(curves, unit, None if unit is None else LENGTHS[unit], skipped)
+
+
+def _said_unit(content: bytes) -> str | None:
+    """The unit of length that a comment before an OBJ file's elements says, as "# unit: mm" or, of
+    Rhino, "# File units = millimeters"; None where none does, or it isn't known here."""
+    for line in content[:_HEAD].decode("utf-8", "replace").splitlines():
+        if line.strip() and not line.lstrip().startswith("#"):
+            return None
+        if found := _UNIT_COMMENT.match(line):
+            word = found.group(1).lower()
+            return word if word in LENGTHS else _UNIT_WORDS.get(word)
+    return None
 
 
 def _free_forms(found: ObjContent) -> Iterator[DrawnCurve]:

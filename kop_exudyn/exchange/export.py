@@ -108,8 +108,12 @@ def _write_states(
 ) -> list[Path]:
     """Files of one design's states: one each, or one for all of them where programs have layers."""
     labels = () if parts is None else all_labels(parts)
+    units = states[0].design.units
+    unit = None if units is None else units.length
     writers: dict[str, Callable[[Path, DesignState], Path]] = {
-        "obj": lambda path, state: write_obj(path, state.lines, state.names, overwrite=overwrite),
+        "obj": lambda path, state: write_obj(
+            path, state.lines, state.names, unit=unit, overwrite=overwrite
+        ),
         "ply": lambda path, state: _write_ply(path, state, overwrite),
         "vtu": lambda path, state: write_vtu(path, state, labels, overwrite=overwrite),
         "glb": lambda path, state: write_glb(path, [state], overwrite=overwrite),
@@ -131,6 +135,7 @@ def _write_states(
                 path,
                 target.vertices + states[0].design.origin,
                 target.faces,
+                unit=unit,
                 overwrite=overwrite,
             )
         )

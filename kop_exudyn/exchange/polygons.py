@@ -11,10 +11,16 @@ from ..files.files import write_bytes, write_text
 from .meshes import RodMesh
 
 
-def obj_polylines(polylines: Sequence[np.ndarray], names: Sequence[str] | None = None) -> str:
-    """Polylines (k, 3) as OBJ, one line element each, in a group of its own where names are
-    given."""
-    lines, count = [], 0
+def obj_polylines(
+    polylines: Sequence[np.ndarray],
+    names: Sequence[str] | None = None,
+    unit: str | None = None,
+) -> str:
+    """Polylines (k, 3) as OBJ, one line element each, in a group of its own where names are given.
+
+    unit : of length, which a comment says; OBJ has no field for it
+    """
+    lines, count = _unit_comment(unit), 0
     for number, points in enumerate(polylines):
         if names is not None:
             lines.append(f"g {'_'.join(names[number].split())}")
@@ -29,19 +35,36 @@ def write_obj(
     polylines: Sequence[np.ndarray],
     names: Sequence[str] | None = None,
     *,
+    unit: str | None = None,
     overwrite: bool = False,
 ) -> Path:
-    """Write polylines. Raises InputError when the file exists or can't be written."""
-    return write_text(path, obj_polylines(polylines, names), overwrite=overwrite)
+    """Write polylines, see `obj_polylines`. Raises InputError when the file exists or can't be
+    written."""
+    return write_text(path, obj_polylines(polylines, names, unit), overwrite=overwrite)
 
 
 def write_mesh_obj(
-    path: str | Path, vertices: np.ndarray, faces: np.ndarray, *, overwrite: bool = False
+    path: str | Path,
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    *,
+    unit: str | None = None,
+    overwrite: bool = False,
 ) -> Path:
-    """Write a triangle mesh as OBJ. Raises InputError when the file exists or can't be written."""
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices, float).tolist()]
+    """Write a triangle mesh, vertices (V, 3) and faces (F, 3), as OBJ.
+
+    unit : of length, which a comment says
+
+    Raises InputError when the file exists or can't be written.
+    """
+    lines = _unit_comment(unit)
+    lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices, float).tolist()]
     lines += [f"f {a} {b} {c}" for a, b, c in (np.asarray(faces) + 1).tolist()]
     return write_text(path, "\n".join([*lines, ""]), overwrite=overwrite)
+
+
+def _unit_comment(unit: str | None) -> list[str]:
+    return [] if unit is None else [f"# unit: {unit}"]
 
 
 def ply_bytes(mesh: RodMesh, colours: np.ndarray) -> bytes:
@@ -76,13 +99,3 @@ def write_ply(
 ) -> Path:
     """Write rod solids. Raises InputError when the file exists or can't be written."""
     return write_bytes(path, ply_bytes(mesh, colours), overwrite=overwrite)
-
-
-def write_surface(
-    path: str | Path, vertices: np.ndarray, faces: np.ndarray, *, overwrite: bool = False
-) -> Path:
-    """Write a triangle mesh, vertices (V, 3) and faces (F, 3), as OBJ. Raises InputError when the
-    file exists or can't be written."""
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices, float).tolist()]
-    lines += [f"f {a} {b} {c}" for a, b, c in (np.asarray(faces, int) + 1).tolist()]
-    return write_text(path, "\n".join([*lines, ""]), overwrite=overwrite)

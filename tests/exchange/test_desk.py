@@ -146,6 +146,9 @@ def test_obj_has_a_group_for_every_rod_and_the_target_a_file(folder, state):
     assert len(set(groups)) == len(groups) and groups[0].startswith("L")
     target = trimesh.load(folder / "first_assigned_target.obj", process=False)
     assert len(target.faces) == len(state.target.faces)
+    unit = state.design.units and state.design.units.length
+    said = [line for line in text if line.startswith("#")]
+    assert said == ([] if unit is None else [f"# unit: {unit}"])
 
 
 def test_rhino_file_has_layers_by_part_and_user_text(folder, state):

@@ -6,6 +6,7 @@ import pytest
 import trimesh
 
 from kop_exudyn.errors import InputError
+from kop_exudyn.exchange.curve_files import read_drawing
 from kop_exudyn.exchange.meshes import sweep, tube
 from kop_exudyn.exchange.polygons import write_obj, write_ply
 from kop_exudyn.rods.rotations import rotation_z
@@ -107,3 +108,23 @@ def test_obj_lines(shells, deployed, tmp_path):
         np.testing.assert_array_equal(a, b)
     named = write_obj(tmp_path / "named.obj", lines[:2], ["rod 1", "rod 2"]).read_text()
     assert "g rod_1\n" in named
+    path = write_obj(tmp_path / "inches.obj", lines, unit="in")
+    assert path.read_text().startswith("# unit: in\nv ")
+    assert (read_drawing(path).unit, read_drawing(path).metres) == ("in", 0.0254)
+
+
+@pytest.mark.parametrize(
+    "head, unit",
+    [
+        ("# Rhino\n\n# File units = millimeters\n", "mm"),
+        ("# Units: m\n", "m"),
+        ("# unit: parsec\n", None),
+        ("# united we stand\n", None),
+        ("v 0 0 0\n# unit: m\n", None),  # a comment among the elements may be about anything
+        ("", None),
+    ],
+)
+def test_units_that_obj_files_say_in_comments(head, unit, tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_text(f"{head}v 0 0 0\nv 1 0 0\nl -2 -1\n")
+    assert read_drawing(path).unit == unit
