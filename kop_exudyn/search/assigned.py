@@ -4,7 +4,7 @@ then the parts' SQP."""
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 
@@ -14,7 +14,7 @@ from ..errors import SimulationFailure
 from .events import ASSIGNED, SQPLabel
 from .objective import DesignDerivatives, Evaluation
 from .reassign import LocalModel, MoveParts, Reassignment, best_parts, keep_parts, reassign
-from .stage_results import StageResult, combined
+from .stage_results import SAME_STATE, StageResult, combined, distance
 from .stages import Stages
 
 log = logging.getLogger(__name__)
@@ -82,6 +82,28 @@ def assigned_stage(
     return replace(end, steps=rounds.steps, jumps=start.jumps)
 
 
+def further_rounds(
+    stages: Stages,
+    start: StageResult,
+    numbers: Iterator[int],
+    label: Callable[[int], SQPLabel] = SQPLabel.of_round,
+    seen: list[StageResult] | None = None,
+) -> StageResult:
+    """Reassigned and optimised in turns from where an SQP came to its end, with the rounds' own
+    tolerances; not confirmed yet.
+
+    In secured stages an SQP ends where one of the designs is about to open elsewhere; with other
+    parts for some of its elements it often can go on.
+
+    label : of the SQP of a number; seen : gets the results on the way
+    """
+    if not stages.settings.reassignments or start.value is None:
+        return start
+    rounds = _Rounds(stages, numbers, start.steps, [] if seen is None else seen, label)
+    best = rounds.alternated(start, stages.settings.reassignments, optimised=True)
+    return replace(best, steps=rounds.steps, jumps=start.jumps)
+
+
 @dataclass
 class _Rounds:
     """Rounds with numbers, the steps of their SQPs (those of rounds that are undone included), and
@@ -91,12 +113,16 @@ class _Rounds:
     numbers: Iterator[int]
     steps: int
     seen: list[StageResult]
+    label: Callable[[int], SQPLabel] = SQPLabel.of_round
 
-    def alternated(self, best: StageResult, rounds: int) -> StageResult:
-        """Reassigned and optimised in so many rounds at most, as long as they gain."""
+    def alternated(self, best: StageResult, rounds: int, optimised: bool = False) -> StageResult:
+        """Reassigned and optimised in so many rounds at most, as long as they gain.
+
+        optimised : whether the parts are at their best already, for this assignment
+        """
         for number in range(rounds):
             result = _many_reassigned(self.stages, best)
-            if result is best and (number > 0 or not self.stages.optimises):
+            if result is best and (number > 0 or optimised or not self.stages.optimises):
                 break
             self.seen.append(result)
             result = self._optimised(result)
@@ -131,7 +157,7 @@ class _Rounds:
         settings = self.stages.settings
         result = self.stages.assigned(
             result,
-            SQPLabel.of_round(next(self.numbers)),
+            self.label(next(self.numbers)),
             max_steps or settings.round_steps,
             tolerance or settings.round_tolerance,
         )
@@ -166,9 +192,45 @@ def _best_trial(stages: Stages, best: StageResult) -> StageResult | None:
     for trial in sorted(found, key=_value):
         if _value(trial) >= _PATIENCE * _value(best):
             break
-        if (kept := stages.kept(trial)).value is not None:
+        if (kept := _kept(stages, best, trial)) is not None:
             return kept
     return None
+
+
+def _kept(stages: Stages, best: StageResult, trial: StageResult) -> StageResult | None:
+    """A trial as it is gone on from; None where that isn't possible.
+
+    In secured stages it is opened. Designs that then don't open, or open elsewhere and lose by it,
+    or that errors of the workshop make snap, stay as they were, where the parts do; that has to be
+    better than before.
+    """
+    kept = stages.kept(trial)
+    if kept.value is None or not stages.dataset.requirements.opening:
+        return None if kept.value is None else kept
+    lost = [
+        n
+        for n, (design, a, b) in enumerate(zip(stages.dataset.designs, kept.designs, trial.designs))
+        if isinstance(a, Evaluation) and isinstance(b, Evaluation)
+        if (design.way is not None and not a.way)
+        or (
+            distance(design, a, b) > SAME_STATE
+            and _share(stages, kept, n) > _share(stages, best, n)
+        )
+    ]
+    if stages.dataset.requirements.samples:
+        changed = [
+            n
+            for n, (a, b) in enumerate(zip(kept.evaluations, best.evaluations))
+            if n not in lost and not np.array_equal(a.q, b.q)
+        ]
+        lost += stages.snapping_among(kept, changed)
+    if not lost:
+        return kept
+    if any(not np.array_equal(trial.kit[kind], best.kit[kind]) for kind in best.kit.sizes):
+        return None
+    chosen = [best if n in lost else kept for n in range(len(best.designs))]
+    found = stages.judged(combined(chosen, stages.dataset))
+    return found if _value(found) < _value(best) else None
 
 
 def _each_its_own(

@@ -49,6 +49,11 @@ class SQPLabel:
         """The SQP of a round of the assigned stage."""
         return cls(f"{Stage.ASSIGNED}-{number}", Stage.ASSIGNED, number)
 
+    @classmethod
+    def of_levelling(cls, number: int) -> SQPLabel:
+        """The SQP of a round in which large deviations weigh more, see levelling.py."""
+        return cls(f"{LEVELLED.name}-{number}", Stage.ASSIGNED, number)
+
 
 ASSIGNED = SQPLabel(Stage.ASSIGNED, Stage.ASSIGNED)  # the assigned stage without rounds
 LEVELLED = SQPLabel(f"{Stage.ASSIGNED}-levelled", Stage.ASSIGNED)  # see levelling.py

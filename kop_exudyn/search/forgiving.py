@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .assigned import further_rounds
 from .events import SQPLabel
 from .reassign import LocalModel, improved, keep_parts
 from .shaking import shaken
@@ -94,6 +95,21 @@ def forgiving_stage(
     return replace(won, steps=max(steps, won.steps))
 
 
+def proven(stages: Stages, result: StageResult) -> StageResult:
+    """A result that forgives, tried with more sets of errors; designs that snap in one of them are
+    made of the same parts otherwise, where that helps."""
+    if result.value is None or result.snapping:
+        return result
+    proving = stages.proving()
+    lost = proving.snapping(result)
+    if not lost:
+        return result
+    names = [stages.dataset.designs[n].name for n in lost]
+    log.info("in more sets of errors %s snap", ", ".join(names))
+    mended, still = made_otherwise(proving, result, lost)
+    return replace(mended, snapping=still)
+
+
 def substitute(
     stages: Stages, best: StageResult, others: Sequence[StageResult]
 ) -> StageResult | None:
@@ -165,12 +181,14 @@ def secured_steps(
 ) -> StageResult:
     """Designs in the states that they open into, with the parts optimised once more in steps that
     keep every design on the branch along which it opens, and forgiving if it is that; as they were
-    where that gains nothing."""
+    where that gains nothing. Where the way on is blocked, rounds of reassignments follow."""
     secured = stages.secured(forgiving=forgiving)
     best = stages.secured().kept(best)
     if not stages.optimises or best.value is None:
         return best
     found = secured.assigned(best, SQPLabel.of_round(next(numbers)))
+    if found.blocked:
+        found = further_rounds(secured, found, numbers)
     opened = replace(found, designs=secured.redeployed(found))
     same = found.value is not None and all_same(secured.dataset.designs, found, opened)
     return replace(found, steps=best.steps + found.steps) if same else best

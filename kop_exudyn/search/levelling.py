@@ -3,8 +3,8 @@
 J has the mean square of the joints' distances from the target, summed over the designs. A single
 joint that is far off hardly counts there, and yet it is what is seen. Here distances d beyond a
 level s count with their fourth power, d^2 (1 + d^2 / (2 s^2)): as in a p-norm the largest tell,
-and it is smooth, with exact gradients. The assignment stays, and steps keep every design on the
-branch along which it opens, and forgiving.
+and it is smooth, with exact gradients. Steps keep every design on the branch along which it opens,
+and forgiving; so do the reassignments that follow where a design is still far off.
 """
 
 from __future__ import annotations
@@ -12,13 +12,18 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import count
 
-from .events import LEVELLED
+from .assigned import further_rounds
+from .events import LEVELLED, SQPLabel
 from .objective import Evaluation
 from .stage_results import StageResult, all_same
 from .stages import Stages
 
 log = logging.getLogger(__name__)
+
+_LOOKED_AT = 6  # results on the way, at most
+_FELT = 5.0  # times the level: where the largest deviation is beyond that, other parts are tried
 
 
 def level(stages: Stages, result: StageResult) -> StageResult:
@@ -26,7 +31,8 @@ def level(stages: Stages, result: StageResult) -> StageResult:
     where none are found.
 
     What is gained is not paid for by what is required: bounds are exceeded by no more than before,
-    every design opens into the state that is reported, and no other designs snap.
+    every design opens into the state that is reported, and no other designs snap, in more sets of
+    errors than the steps were tried with.
     """
     share = stages.settings.levelling
     if not share or not stages.optimises or result.value is None:
@@ -37,21 +43,29 @@ def level(stages: Stages, result: StageResult) -> StageResult:
     if start.value is None:
         return result
     end = levelled.assigned(start, LEVELLED, settings.round_steps, settings.round_tolerance)
-    found = secured.weighed(end)
-    if found.value is None or not _better(stages, found, result):
-        return result
-    snapping = stages.snapping(found)
-    if not set(snapping) <= set(result.snapping):
-        return result
-    log.info(
-        "largest deviation %.3g %%, from %.3g %%, at J = %.5g, from %.5g",
-        worst(found.designs),
-        worst(result.designs),
-        found.value,
-        result.value,
-    )
-    steps = result.steps + end.steps
-    return replace(found, steps=steps, jumps=result.jumps, snapping=snapping)
+    ends, steps = [end], result.steps + end.steps
+    if worst(end.designs) > 100 * _FELT * share:
+        careful = stages.careful().secured(forgiving=not result.snapping).levelled(share)
+        last = further_rounds(careful, end, count(1), SQPLabel.of_levelling, ends)
+        ends.append(last)
+        steps = result.steps + last.steps
+    proving = stages.proving()
+    for trial in sorted(ends, key=lambda one: worst(one.designs))[:_LOOKED_AT]:
+        found = secured.weighed(trial)
+        if found.value is None or not _better(stages, found, result):
+            continue
+        snapping = proving.snapping(found)
+        if not set(snapping) <= set(result.snapping):
+            continue
+        log.info(
+            "largest deviation %.3g %%, from %.3g %%, at J = %.5g, from %.5g",
+            worst(found.designs),
+            worst(result.designs),
+            found.value,
+            result.value,
+        )
+        return replace(found, steps=steps, jumps=result.jumps, snapping=snapping)
+    return replace(result, steps=steps)
 
 
 def worst(designs: Sequence[object]) -> float:

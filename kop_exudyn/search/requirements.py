@@ -22,6 +22,7 @@ class Requirements:
     length, angle : standard deviations of these errors, in the designs' unit and rad; None: the
         usual ones, see `usual_tolerance`
     margin : factor by which the errors are larger than that, so that few sets tell what many would
+    seed : of the sets
     penalty : weight of a bound's excess (utilisation beyond 1), as a share of the fit's weight:
         at first 1 % of excess counts as much as a deviation of 1 % of the size at every joint
 
@@ -36,12 +37,14 @@ class Requirements:
     length: float | None = None
     angle: float | None = None
     margin: float = 1.5
+    seed: int = 0
     penalty: float = 0.01
 
     def __post_init__(self) -> None:
         for name in ("opening", "stress", "loads"):
             check_flag(name, getattr(self, name))
-        check_whole("samples", self.samples)
+        for name in ("samples", "seed"):
+            check_whole(name, getattr(self, name))
         for name in ("length", "angle"):
             if getattr(self, name) is not None:
                 check_not_negative(name, getattr(self, name))

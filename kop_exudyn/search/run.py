@@ -30,6 +30,7 @@ from ..units import common_units, unit_of, unnamed_units
 from .checkpoints import NoStore, Store
 from .dataset import Dataset
 from .events import UNRELAXED, Observer, StageEvent
+from .forgiving import proven
 from .levelling import level
 from .neighbours import resized
 from .objective import Evaluation, Weights
@@ -153,7 +154,7 @@ def optimize_kit(
             seen=[each for seen in starts.seen.values() for each in seen],
         )
         forgiving = forgiving_from_starts(stages, starts, opened, result.at_parts)
-        found["assigned"] = level(stages, forgiving)
+        found["assigned"] = level(stages, proven(stages, forgiving))
         result.tried = starts.tried
         result.seconds["search"] = perf_counter() - begin_search
         found.update({stage: _confirmed(stages, outcome) for stage, outcome in found.items()})

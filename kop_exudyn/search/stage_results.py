@@ -43,6 +43,7 @@ class StageResult:
         would fall for each unit that the bound were wider
     snapping : the designs that errors of the workshop make snap, where nothing was found that keeps
         all of them from it
+    blocked : whether points beyond where the last SQP ended could not be simulated
     """
 
     designs: list[Evaluation | SimulationFailure]
@@ -56,6 +57,7 @@ class StageResult:
     pressure: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     reuse_factor: float = 1.0
     snapping: tuple[int, ...] = ()
+    blocked: bool = False
 
     @property
     def merit(self) -> float:

@@ -32,6 +32,11 @@ from .stage_results import Jump, StageResult, find_jump, restrict
 
 log = logging.getLogger(__name__)
 
+_MORE = 4  # times the sets of errors, where more are asked for
+_PROOF_MARGIN = (
+    1.25  # how much larger than a workshop's are the errors that prove a result, at most
+)
+
 
 class Stages:
     """Runs the stages for one dataset; interrupted SQPs go on from the store's checkpoints.
@@ -154,7 +159,7 @@ class Stages:
         found = self._result(
             designs, result.point.data.kit, start.assignment, result.steps, result.status
         )
-        return replace(found, pressure=_pressure(result))
+        return replace(found, pressure=_pressure(result), blocked=_blocked(result))
 
     def assigned_problem(self, start: StageResult, members: Sequence[int]) -> AssignedProblem:
         """The problem over the parts, for some of the designs."""
@@ -253,6 +258,21 @@ class Stages:
         other = copy(self)
         samples = self.required.samples if forgiving else 0
         other.dataset = self.dataset.requiring(replace(self.required, samples=samples))
+        return other
+
+    def careful(self) -> Stages:
+        """The same stages with more sets of errors that results, and steps that are to forgive, are
+        tried with."""
+        other = copy(self)
+        other.required = replace(self.required, samples=_MORE * self.required.samples)
+        return other
+
+    def proving(self) -> Stages:
+        """The same stages with other and more sets of errors, to try results with: steps that keep
+        to some sets come to where just these are forgiven."""
+        other = self.careful()
+        margin = min(self.required.margin, _PROOF_MARGIN)
+        other.required = replace(other.required, margin=margin, seed=self.required.seed + 1)
         return other
 
     def calmer(self, factor: float) -> Stages:
@@ -523,6 +543,13 @@ class Stages:
             return None, 0.0
         value = self.dataset.value(found)
         return value + self.costs.value(kit), self.dataset.merit(found) - value
+
+
+def _blocked(result: SQPResult) -> bool:
+    """Whether an SQP ended where its next points could not be simulated, whatever its tolerance
+    says: steps become short there."""
+    last = result.history[-1].failures if result.history else result.failures
+    return last > 0
 
 
 def _pressure(result: SQPResult) -> dict[str, dict[str, float]]:

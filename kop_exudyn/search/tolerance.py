@@ -112,14 +112,16 @@ def sample_spread(
 
 def forgives(objective: DesignObjective, evaluation: Evaluation) -> bool:
     """Whether none of the sets of errors that the objective's requirements name makes a design
-    snap. They are other sets than those that `sample_spread` draws for a verdict."""
+    snap. They are other sets than those that `sample_spread` draws for a verdict.
+
+    """
     required, design = objective.requirements, objective.design
     usual = usual_tolerance(design)
     tolerance = Tolerance(
         usual.length if required.length is None else required.length,
         usual.angle if required.angle is None else required.angle,
     ).scaled(required.margin)
-    generator = np.random.default_rng(_SEARCH)
+    generator = np.random.default_rng([*_SEARCH, required.seed])
     samples = _samples(objective, evaluation, tolerance, required.samples, generator, 0.0)
     return not any(sample.snapped or sample.failed is not None for sample in samples)
 

@@ -3,10 +3,12 @@
 from copy import copy
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.designs import load_design
+from kop_exudyn.search import levelling
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.events import LEVELLED
 from kop_exudyn.search.levelling import level, worst
@@ -34,7 +36,9 @@ def found(repository):
         before = stages.secured().assigned(stages.secured().kept(stages.direct()))
         assert not stages.snapping(before)
         steps.clear()
-        after = level(stages, before)
+        with pytest.MonkeyPatch.context() as patch:  # the rounds after it: test_further_rounds.py
+            patch.setattr(levelling, "_FELT", np.inf)
+            after = level(stages, before)
         told = stages.snapping(after)
         yield stages, before, after, steps, told
 

@@ -1,0 +1,171 @@
+"""Reassignments in secured stages: from where steps can't go on, and never to what is lost by."""
+
+from dataclasses import replace
+from itertools import count
+
+import numpy as np
+import pytest
+
+from kop_exudyn.errors import SimulationFailure
+from kop_exudyn.io.designs import load_design
+from kop_exudyn.search import assigned, forgiving, levelling
+from kop_exudyn.search.assigned import further_rounds
+from kop_exudyn.search.dataset import Dataset
+from kop_exudyn.search.levelling import level, worst
+from kop_exudyn.search.objective import DesignObjective, Weights
+from kop_exudyn.search.pool import DesignPool
+from kop_exudyn.search.reassign import keep_parts
+from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.stages import Stages
+
+SETTINGS = StageSettings(assigned_steps=3, round_steps=6)
+
+
+@pytest.fixture(scope="module")
+def found(repository):
+    """Secured stages of two small shells, a kit after a few steps, and further rounds from there
+    with what steps they took."""
+    shells = [
+        load_design(repository / "models" / "small" / name)
+        for name in ("01_sinh.json", "06_moebius.json")
+    ]
+    steps = []
+    with DesignPool(shells) as pool:
+        pool.prepare()
+        dataset = Dataset.of_pool(pool, Weights.suiting(shells))
+        stages = Stages(dataset, {"linear": 4, "angular": 2}, SETTINGS, observer=steps.append)
+        secured = stages.secured(forgiving=True)
+        start = secured.assigned(secured.kept(secured.direct()))
+        steps.clear()
+        after = further_rounds(secured, start, count(7))
+        yield stages, secured, start, after, list(steps)
+
+
+def test_they_go_on_with_other_parts(found):
+    _, _, start, after, steps = found
+    assert after.merit < 0.98 * start.merit
+    assert after.assignment.changes(start.assignment) > 0
+    assert {event.round for event in steps} == set(range(7, 7 + len({e.round for e in steps})))
+    assert after.steps == start.steps + len(steps)
+
+
+def test_what_is_required_stays_met_on_the_way(found):
+    stages, _, _, after, _ = found
+    assert stages.snapping(after) == ()
+    for shell, reference, built in zip(
+        stages.dataset.designs, stages.dataset.references, after.designs
+    ):
+        assert built.way
+        objective = DesignObjective(shell, stages.dataset.weights, reference, stages.required)
+        assert objective.apart(objective.redeploy(built.q), built) < 1e-3
+
+
+def test_a_design_that_is_lost_stays_as_it_was(found, monkeypatch):
+    """Of a trial with the same parts the others are kept; one with other parts is given up."""
+    _, secured, start, _, _ = found
+    derivatives = secured.dataset.derivatives(start.evaluations, hessian=True)
+    trials = [
+        trial[0]
+        for damping in (1.0, 0.1, 0.01)
+        if (trial := assigned._trial(secured, start, derivatives, damping, (), keep_parts))
+    ]
+    both = next(
+        trial
+        for trial in sorted(trials, key=lambda trial: trial.merit)
+        if all(
+            new.value < old.value and not np.array_equal(new.q, old.q)
+            for new, old in zip(trial.designs, start.designs)
+        )
+    )
+    whole = assigned._kept(secured, start, both)
+    monkeypatch.setattr(
+        Stages, "snapping_among", lambda self, result, members: (1,) if 1 in members else ()
+    )
+    part = assigned._kept(secured, start, both)
+    assert whole.merit < part.merit < start.merit
+    assert np.array_equal(part.designs[1].q, start.designs[1].q)
+    assert np.array_equal(part.designs[0].q, both.designs[0].q)
+    moved = replace(both, kit=replace_parts(both.kit))
+    assert assigned._kept(secured, start, moved) is None
+
+
+def replace_parts(kit):
+    return replace(kit, parts={name: rows * 1.001 for name, rows in kit.parts.items()})
+
+
+def test_steps_that_can_go_no_further_are_followed_by_rounds(found, monkeypatch):
+    stages, _, start, after, _ = found
+    calls = []
+
+    def rounds(secured, result, numbers):
+        calls.append(result.blocked)
+        return after
+
+    monkeypatch.setattr(forgiving, "further_rounds", rounds)
+    free = forgiving.secured_steps(stages, start, count(20), forgiving=True)
+    assert calls == [] and free.merit < start.merit
+    completed = Dataset.completed
+
+    def wall(self, evaluations, previous):
+        """No step may bring more than a little."""
+        if self.value(evaluations) < 0.999 * start.value:
+            raise SimulationFailure("here is a wall")
+        return completed(self, evaluations, previous)
+
+    monkeypatch.setattr(Dataset, "completed", wall)
+    won = forgiving.secured_steps(stages, start, count(30), forgiving=True)
+    assert calls == [True] and won.merit == after.merit
+
+
+def test_levelling_tries_other_parts_where_a_deviation_is_felt(found, monkeypatch):
+    stages, _, _, after, _ = found
+    tried = []
+
+    def rounds(levelled, result, numbers, label, seen):
+        tried.append(label(next(numbers)).name)
+        return further_rounds(levelled, result, numbers, label, seen)
+
+    monkeypatch.setattr(levelling, "further_rounds", rounds)
+    monkeypatch.setattr(levelling, "_FELT", 1.0)
+    assert worst(after.designs) > 100 * SETTINGS.levelling
+    found_level = level(stages, after)
+    assert tried == ["assigned-levelled-1"]
+    assert worst(found_level.designs) <= worst(after.designs)
+    tried.clear()
+    monkeypatch.setattr(levelling, "_FELT", 1e3)
+    level(stages, after)
+    assert tried == []
+
+
+def test_levelled_results_are_proved_with_more_errors(found, monkeypatch):
+    """Of results on the way the best one that forgives these is taken, and none that doesn't."""
+    stages, _, _, after, _ = found
+    proving = stages.proving()
+    assert proving.required.samples == 4 * stages.required.samples
+    assert proving.required.margin < stages.required.margin
+    assert proving.required.seed != stages.required.seed
+    better = level(stages, after)
+    assert better is not after and worst(better.designs) < worst(after.designs)
+    asked = []
+
+    def snapping(self, result, members):
+        asked.append(self.required.seed)
+        return (0,) if self.required.seed == proving.required.seed else ()
+
+    monkeypatch.setattr(Stages, "snapping_among", snapping)
+    unproved = level(stages, after)
+    assert proving.required.seed in asked
+    assert worst(unproved.designs) == worst(after.designs) and unproved.snapping == ()
+
+
+def test_a_kit_that_snaps_in_more_sets_is_made_otherwise_or_says_so(found, monkeypatch):
+    stages, _, _, after, _ = found
+    mended = forgiving.proven(stages, after)
+    assert mended.snapping == stages.proving().snapping(mended)
+    monkeypatch.setattr(Stages, "snapping_among", lambda self, result, members: ())
+    assert forgiving.proven(stages, after) is after
+    monkeypatch.setattr(Stages, "snapping_among", lambda self, result, members: (1,))
+    told = forgiving.proven(stages, after)
+    assert told.snapping == (1,) and told.merit == after.merit
+    known = replace(after, snapping=(0,))
+    assert forgiving.proven(stages, known) is known
