@@ -174,7 +174,8 @@ def common_units(named: Mapping[str, Units | None], what: str = "designs") -> Un
         if other != units:
             raise InputError(
                 f"{what} that go together need the same units: {first} has {units}, {name} has "
-                f"{other} (kop import --unit and --force-unit write a drawing's design in others)",
+                f"{other} (kop import FILE --unit {units.length} --force-unit {units.force} --out "
+                "NEW writes a design in these)",
                 field="units",
             )
     return units

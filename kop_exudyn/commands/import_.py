@@ -30,8 +30,10 @@ DESCRIPTION = """Writes a design file from
   in a plane. Pieces that go on in each other become one curve; ends that meet and are of the two different families
   are hinged.
 
-  a surface (with --patch; a mesh: .obj, .ply, .stl, .off, or .json of COMPAS): an umbrella mesh in the shape of its middle,
-  in millimetres, the arms as long as the cells have to grow.
+  a surface (with --patch; a mesh: .obj, .ply, .stl, .off, or .json of COMPAS): an umbrella mesh in the shape of its
+  middle, in millimetres, the arms as long as the cells have to grow.
+
+  a design file of a C-shell or a grid (.json), with --unit: the same design in other units.
 
   an umbrella mesh in the format of its public release (.json or .json.gz): the same mesh, in millimetres. Such files
   can also be used directly wherever a design is expected.
@@ -40,9 +42,12 @@ What was understood is printed, and drawn with --preview; without --out that is 
 EXAMPLES = """examples:
   kop import net.dxf --preview net.html
   kop import net.dxf --out net.json --opening 0.6 --section 0.03,0.004 --material 2.1e9,0.35 --unit m
+  kop import sheet.dxf --largest-part --preview net.html
+  kop import quads.obj --edges --as grid --preview net.html
   kop import net.obj --out net.json --opening 35deg --section 30,4 --material 2100,0.35 --scale 1000 --unit mm
   kop import plan.dxf --as grid --surface vault.obj --out vault.json --section 0.004,0.05 --material 1.1e10,0.3
   kop import dome.ply --as umbrella --patch hexagon,3 --out dome.json --scale 1000
+  kop import shell_mm.json --unit m --out shell_m.json
   kop import hemisphere_5t.json.gz --out hemisphere.json --plates rigid"""  # noqa: E501  # a command on one line can be copied
 
 _CLASSES = ("c_shell", "grid", "umbrella")
@@ -531,7 +536,7 @@ def _figures(design: Design, data: dict[str, Any]) -> tuple[dict[str, Any], list
         ]
     if units is not None:
         rows.append(("units", f"{units['length']}, {units['force']}"))
-    if "target" not in data:
+    if "target" not in data and design.class_name == "umbrella":
         rows.append(("look at", "no target surface: the deployed design itself is taken as one"))
     return figures, rows
 
@@ -549,9 +554,7 @@ def _undrawn_data(args: argparse.Namespace) -> dict[str, Any]:
         raise InputError("an umbrella mesh on a surface needs --patch", source=args.file)
     data = read_json(args.file)
     if is_own(data):
-        raise InputError(
-            "is a file of kop_exudyn already: use it as it is", source=args.file, field="format"
-        )
+        return _converted(args, data)
     foreign = foreign_format(data)
     if foreign is None or foreign.rewrite is None:
         raise InputError(
@@ -561,6 +564,31 @@ def _undrawn_data(args: argparse.Namespace) -> dict[str, Any]:
     if own["class"] == "umbrella" and args.plates == "rigid":
         own["plate_model"] = args.plates
     return own
+
+
+def _converted(args: argparse.Namespace, data: dict[str, Any]) -> dict[str, Any]:
+    """The content of a design file of our own, in the units asked for."""
+    from ..errors import InputError
+    from ..io.conversion import in_units
+    from ..io.designs import load_design
+    from ..io.rescaling import relocated
+    from ..units import Units
+
+    if args.unit is None or data["format"] != "kop_exudyn/design":
+        raise InputError(
+            "is a file of kop_exudyn already: use it as it is (designs: or give --unit, to write "
+            "it in another unit)",
+            source=args.file,
+            field="format",
+        )
+    if args.scale is not None:
+        raise InputError("isn't for designs: --unit says how they are scaled", field="--scale")
+    load_design(args.file)  # refuses what is no design
+    try:
+        converted = in_units(data, Units(args.unit, args.force_unit))
+    except InputError as error:
+        raise error.at(args.file) from None
+    return relocated(converted, args.file.parent, (args.out or args.file).parent)
 
 
 def _umbrella_on_mesh(args: argparse.Namespace) -> dict[str, Any]:

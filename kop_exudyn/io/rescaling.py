@@ -31,18 +31,21 @@ def save_rescaled(files: Sequence[Path], scales: Sequence[float], folder: str | 
             raise error.at(file) from None
     made = make_folder(folder)
     return [
-        write_json(made / file.name.removesuffix(".gz"), _moved(data, file.parent, made))
+        write_json(made / file.name.removesuffix(".gz"), relocated(data, file.parent, made))
         for file, data in zip(files, content)
     ]
 
 
-def _moved(value: Any, old: Path, new: Path) -> Any:
-    """The same with the paths in fields "file" relative to another folder."""
+def relocated(value: Any, old: Path, new: Path) -> Any:
+    """The content of a design file with the paths in fields "file" relative to another folder.
+
+    old, new : folders that paths are, and become, relative to
+    """
     if isinstance(value, dict):
         return {
             key: Path(os.path.relpath(old / item, new)).as_posix()
             if key == "file" and isinstance(item, str)
-            else _moved(item, old, new)
+            else relocated(item, old, new)
             for key, item in value.items()
         }
-    return [_moved(item, old, new) for item in value] if isinstance(value, list) else value
+    return [relocated(item, old, new) for item in value] if isinstance(value, list) else value
