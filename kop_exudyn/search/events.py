@@ -52,11 +52,10 @@ class SQPLabel:
     @classmethod
     def of_levelling(cls, number: int) -> SQPLabel:
         """The SQP of a round in which large deviations weigh more, see levelling.py."""
-        return cls(f"{LEVELLED.name}-{number}", Stage.ASSIGNED, number)
+        return cls(f"{Stage.ASSIGNED}-levelled-{number}", Stage.ASSIGNED)
 
 
 ASSIGNED = SQPLabel(Stage.ASSIGNED, Stage.ASSIGNED)  # the assigned stage without rounds
-LEVELLED = SQPLabel(f"{Stage.ASSIGNED}-levelled", Stage.ASSIGNED)  # see levelling.py
 UNRELAXED = SQPLabel(Stage.UNRELAXED, Stage.UNRELAXED)
 
 

@@ -10,12 +10,11 @@ and forgiving; so do the reassignments that follow where a design is still far o
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import count
 
 from .assigned import further_rounds
-from .events import LEVELLED, SQPLabel
+from .events import SQPLabel
 from .objective import Evaluation
 from .stage_results import StageResult, all_same
 from .stages import Stages
@@ -26,13 +25,15 @@ _LOOKED_AT = 6  # results on the way, at most
 _FELT = 5.0  # times the level: where the largest deviation is beyond that, other parts are tried
 
 
-def level(stages: Stages, result: StageResult) -> StageResult:
+def level(stages: Stages, result: StageResult, numbers: Iterator[int]) -> StageResult:
     """The result with parts whose largest deviation is smaller, at some cost in J; the same one
     where none are found.
 
     What is gained is not paid for by what is required: bounds are exceeded by no more than before,
     every design opens into the state that is reported, and no other designs snap, in more sets of
     errors than the steps were tried with.
+
+    numbers : of the SQPs
     """
     share = stages.settings.levelling
     if not share or not stages.optimises or result.value is None:
@@ -42,11 +43,12 @@ def level(stages: Stages, result: StageResult) -> StageResult:
     start = levelled.kept(levelled.weighed(result))
     if start.value is None:
         return result
-    end = levelled.assigned(start, LEVELLED, settings.round_steps, settings.round_tolerance)
+    label = SQPLabel.of_levelling(next(numbers))
+    end = levelled.assigned(start, label, settings.round_steps, settings.round_tolerance)
     ends, steps = [end], result.steps + end.steps
     if worst(end.designs) > 100 * _FELT * share:
         careful = stages.careful().secured(forgiving=not result.snapping).levelled(share)
-        last = further_rounds(careful, end, count(1), SQPLabel.of_levelling, ends)
+        last = further_rounds(careful, end, numbers, SQPLabel.of_levelling, ends)
         ends.append(last)
         steps = result.steps + last.steps
     proving = stages.proving()

@@ -6,6 +6,7 @@ import hashlib
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
+from itertools import count
 from time import perf_counter
 from typing import Any
 
@@ -154,7 +155,7 @@ def optimize_kit(
             seen=[each for seen in starts.seen.values() for each in seen],
         )
         forgiving = forgiving_from_starts(stages, starts, opened, result.at_parts)
-        found["assigned"] = level(stages, proven(stages, forgiving))
+        found["assigned"] = _levelled(stages, forgiving)
         result.tried = starts.tried
         result.seconds["search"] = perf_counter() - begin_search
         found.update({stage: _confirmed(stages, outcome) for stage, outcome in found.items()})
@@ -175,6 +176,16 @@ def optimize_kit(
     result.wall_s = perf_counter() - begin
     result.settings = described_job(designs, parts, kit, settings) | {"jobs": settings.jobs}
     return result
+
+
+def _levelled(stages: Stages, result: StageResult) -> StageResult:
+    """The result levelled, or as it is, proved with more errors."""
+    numbers = count(1)
+    found = level(stages, result, numbers)
+    if found.designs is not result.designs:  # has been proved already
+        return found
+    mended = proven(stages, result)
+    return mended if mended is result else level(stages, mended, numbers)
 
 
 def _confirmed(stages: Stages, outcome: StageResult) -> StageResult:

@@ -8,7 +8,7 @@ import pytest
 
 from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.io.designs import load_design
-from kop_exudyn.search import assigned, forgiving, levelling
+from kop_exudyn.search import assigned, forgiving, levelling, run
 from kop_exudyn.search.assigned import further_rounds
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.levelling import level, worst
@@ -128,12 +128,12 @@ def test_levelling_tries_other_parts_where_a_deviation_is_felt(found, monkeypatc
     monkeypatch.setattr(levelling, "further_rounds", rounds)
     monkeypatch.setattr(levelling, "_FELT", 1.0)
     assert worst(after.designs) > 100 * SETTINGS.levelling
-    found_level = level(stages, after)
-    assert tried == ["assigned-levelled-1"]
+    found_level = level(stages, after, count(1))
+    assert tried == ["assigned-levelled-2"]
     assert worst(found_level.designs) <= worst(after.designs)
     tried.clear()
     monkeypatch.setattr(levelling, "_FELT", 1e3)
-    level(stages, after)
+    level(stages, after, count(1))
     assert tried == []
 
 
@@ -144,7 +144,7 @@ def test_levelled_results_are_proved_with_more_errors(found, monkeypatch):
     assert proving.required.samples == 4 * stages.required.samples
     assert proving.required.margin < stages.required.margin
     assert proving.required.seed != stages.required.seed
-    better = level(stages, after)
+    better = level(stages, after, count(1))
     assert better is not after and worst(better.designs) < worst(after.designs)
     asked = []
 
@@ -153,7 +153,7 @@ def test_levelled_results_are_proved_with_more_errors(found, monkeypatch):
         return (0,) if self.required.seed == proving.required.seed else ()
 
     monkeypatch.setattr(Stages, "snapping_among", snapping)
-    unproved = level(stages, after)
+    unproved = level(stages, after, count(1))
     assert proving.required.seed in asked
     assert worst(unproved.designs) == worst(after.designs) and unproved.snapping == ()
 
@@ -169,3 +169,19 @@ def test_a_kit_that_snaps_in_more_sets_is_made_otherwise_or_says_so(found, monke
     assert told.snapping == (1,) and told.merit == after.merit
     known = replace(after, snapping=(0,))
     assert forgiving.proven(stages, known) is known
+
+
+def test_a_result_that_is_not_levelled_is_proved_and_levelled_again(found, monkeypatch):
+    stages, _, start, after, _ = found
+    levels = []
+
+    def none(stages, result, numbers):
+        levels.append((result, next(numbers)))
+        return replace(result, steps=result.steps + 1)
+
+    monkeypatch.setattr(run, "level", none)
+    monkeypatch.setattr(run, "proven", lambda stages, result: result)
+    assert run._levelled(stages, start) is start and levels == [(start, 1)]
+    monkeypatch.setattr(run, "proven", lambda stages, result: after)
+    assert run._levelled(stages, start).designs is after.designs
+    assert levels == [(start, 1), (start, 1), (after, 2)]

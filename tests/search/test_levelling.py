@@ -2,6 +2,7 @@
 
 from copy import copy
 from dataclasses import replace
+from itertools import count
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from kop_exudyn.errors import InputError
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.search import levelling
 from kop_exudyn.search.dataset import Dataset
-from kop_exudyn.search.events import LEVELLED
+from kop_exudyn.search.events import SQPLabel
 from kop_exudyn.search.levelling import level, worst
 from kop_exudyn.search.objective import DesignObjective, Weights
 from kop_exudyn.search.pool import DesignPool
@@ -38,7 +39,7 @@ def found(repository):
         steps.clear()
         with pytest.MonkeyPatch.context() as patch:  # the rounds after it: test_further_rounds.py
             patch.setattr(levelling, "_FELT", np.inf)
-            after = level(stages, before)
+            after = level(stages, before, count(7))
         told = stages.snapping(after)
         yield stages, before, after, steps, told
 
@@ -49,7 +50,7 @@ def test_the_largest_deviation_falls(found):
     assert worst(after.designs) < 0.97 * worst(before.designs)
     assert after.assignment.changes(before.assignment) == 0
     assert after.value > before.value
-    assert {event.label for event in steps} == {LEVELLED}
+    assert {event.label for event in steps} == {SQPLabel.of_levelling(7)}
     assert after.steps == before.steps + len(steps)
 
 
@@ -85,9 +86,9 @@ def test_where_nothing_may_or_can_move_the_result_stays(found):
         parts_move = False
 
     fixed.rule = Given()
-    assert level(off, before) is before and level(fixed, before) is before
+    assert level(off, before, count(1)) is before and level(fixed, before, count(1)) is before
     failed = replace(before, value=None)
-    assert level(stages, failed) is failed
+    assert level(stages, failed, count(1)) is failed
 
 
 def test_levels_that_make_no_sense_are_refused():
