@@ -18,6 +18,7 @@ from ..geometry.curves import Curve, curve_from_dict
 from ..geometry.network import CurveNetwork, network
 from .cleaning import TOLERANCE, cleaned
 from .contacts import EndContact, crossing_pieces, end_contacts
+from .corners import rounded_corners, split_at_corners
 from .curve_files import read_drawing
 from .drawing import Drawing, DrawnCurve, Finding, size_of
 from .frames import Frame, frame_of
@@ -30,7 +31,6 @@ from .suspicions import (
     refuse_stray_heights,
     refuse_strays,
     refuse_upright,
-    rounded_corners,
     without_bolts,
 )
 
@@ -80,6 +80,7 @@ class DrawnNetwork:
     frame : the plane that they were laid into
     entries : the field `curves` of a design file
     findings : what a reader should know
+    parts : what to do where the curves fall into parts that aren't connected
     origin (3,) : what was taken off the coordinates of a drawing that lies far from (0, 0, 0); zero
         for others
     """
@@ -90,6 +91,7 @@ class DrawnNetwork:
     frame: Frame
     entries: list[dict[str, Any]]
     findings: list[Finding] = field(default_factory=list)
+    parts: str | None = None
     origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     @property
@@ -157,8 +159,7 @@ class DrawnNetwork:
         """What to do where the drawing falls into parts, or is in space."""
         if not any(words in error.message for words in _APART):
             return None if self.frame.flat else _IN_SPACE.format("xyz"[self._across])
-        flat = [self.frame(curve.points)[:, :2] for curve in self.curves]
-        return advice(self.curves, flat, self.options.tolerance * size_of(self.curves))
+        return self.parts
 
     def _curves(self) -> list[Curve]:
         return [curve_from_dict(e, f"curves[{k}]") for k, e in enumerate(self.entries)]
@@ -223,6 +224,10 @@ def drawn_network(
     if options.largest_part:
         curves, flat, others = largest_part(curves, flat, tolerance)
         done += others
+    parts = advice(curves, flat, tolerance)
+    if options.kind == "spline":
+        curves, flat, split = split_at_corners(curves, flat)
+        done += split
     done += sides_of_laths(curves, flat, tolerance)
     joined = join_ends(
         curves, crossing_pieces(curves, flat, tolerance, size), tolerance, options.join
@@ -232,7 +237,7 @@ def drawn_network(
     if options.kind == "spline":
         findings += rounded_corners(curves)
     entries = [_entry(curve, frame, options, size) for curve in curves]
-    return DrawnNetwork(drawing, options, curves, frame, entries, findings, origin)
+    return DrawnNetwork(drawing, options, curves, frame, entries, findings, parts, origin)
 
 
 def far_origin(points: np.ndarray) -> np.ndarray:

@@ -17,11 +17,13 @@ from scipy.spatial import cKDTree
 from .cleaning import end_groups
 from .drawing import DrawnCurve, Finding
 
-# Four pi area / perimeter^2 is 1 for a circle, 0.14 for a rectangle of 20 to 1.
-_NARROW = 0.15
+# Four pi area / perimeter^2 is 1 for a circle, 0.30 for a rectangle of 8.5 to 1, 0.14 for 20 to 1.
+_NARROW, _VERY_NARROW = 0.30, 0.15
 _SAMPLES = 400  # of an outline, where its ends are searched for
 _TIP = 65  # places in which the tip of an axis is searched for
-_EVEN = 1.5  # times the median width: what the widest place of a strip may be
+# times the median width: what the widest place may be of a strip, and of one that is very narrow;
+# an ellipse's is 1.15
+_EVEN, _TAPERED = 1.1, 1.5
 _PIECES = 12  # drawn pieces that an outline may consist of, at most
 _BESIDE = (
     0.05  # of their lengths: two lines so near to each other all along may be one lath's sides
@@ -40,7 +42,7 @@ def axes_of_strips(
     curves, flat = _loops_of_pieces(curves, flat, tolerance)
     kept, plan, widths, places, label = [], [], [], [], ""
     for curve, points in zip(curves, flat):
-        found = _axis(points) if curve.closed and is_narrow(points) else None
+        found = _axis(points) if curve.closed and _narrowness(points) <= _NARROW else None
         if found is None:
             kept.append(curve)
             plan.append(points)
@@ -61,9 +63,13 @@ def axes_of_strips(
 
 
 def is_narrow(points: np.ndarray) -> bool:
-    """Whether a loop of points (n, 2) is like the outline of a lath."""
+    """Whether a loop of points (n, 2) is clearly like the outline of a lath."""
+    return _narrowness(points) <= _VERY_NARROW
+
+
+def _narrowness(points: np.ndarray) -> float:
     polygon = shapely.Polygon(points)
-    return 4 * np.pi * polygon.area <= _NARROW * polygon.length**2
+    return 4 * np.pi * polygon.area / polygon.length**2
 
 
 def sides_of_laths(
@@ -131,7 +137,7 @@ def _loops_of_pieces(
         ways = [
             np.concatenate([_way(x[k], e)[:-1] for k, e in chain]) for x in (_space(curves), flat)
         ]
-        if is_narrow(ways[1]) and _axis(ways[1]) is not None:
+        if _narrowness(ways[1]) <= _NARROW and _axis(ways[1]) is not None:
             label = f"{curves[start].label} and {len(chain) - 1} more"
             loops[start] = replace(curves[start], points=ways[0], closed=True, label=label), ways[1]
             gone |= {k for k, _ in chain}
@@ -219,7 +225,7 @@ def _axis(points: np.ndarray) -> _Strip | None:
     apart = _apart(points, one, other)
     best = int(apart.mean(axis=1).argmin())
     width, start, end = float(np.median(apart[best])), one[best], other[best]
-    if apart[best].max() > _EVEN * width:
+    if apart[best].max() > (_TAPERED if _narrowness(points) <= _VERY_NARROW else _EVEN) * width:
         return None
     ahead = (end - start) % 1
     own = np.concatenate(  # how far corners are on the way from end to end, on their side

@@ -1,6 +1,5 @@
-"""What a drawing shows besides laths' axes, or as something else than what they become: bolts,
-outlines, corners that smooth curves round off, curves far away from all others or at another
-height."""
+"""What a drawing shows besides laths' axes: bolts, outlines, curves far away from all others, at
+another height, or upright."""
 
 from __future__ import annotations
 
@@ -17,7 +16,6 @@ from .strips import is_narrow
 # small against the way to the next crossing, or, where there is none, against the drawing.
 _CENTRED, _SMALL, _SMALL_ALONE = 0.25, 0.2, 0.05
 _FEW = 0.1  # of the curves: fewer that leave the plane of the others are at a wrong height
-_ROUNDED = 0.1  # of a straight piece: how far a smooth curve may leave it; an octagon's does so
 
 
 def without_bolts(
@@ -77,24 +75,6 @@ def narrow_loops(curves: Sequence[DrawnCurve], flat: Sequence[np.ndarray]) -> li
     return [Finding("suspicious", text, np.array([c.points.mean(axis=0) for c in found]))]
 
 
-def rounded_corners(curves: Sequence[DrawnCurve]) -> list[Finding]:
-    """A finding where smooth curves through the points of polylines are far from what was drawn."""
-    largest, places, worst = 0.0, [], None
-    for curve in curves:
-        away, share, place = _departure(curve)
-        if share > _ROUNDED:
-            places.append(place)
-            if away > largest:
-                largest, worst = away, curve
-    if worst is None:
-        return []
-    text = (
-        f"{len(places)} curves have corners that smooth curves through their points round off, "
-        f"{worst.label} by up to {largest:.3g} (--curves polyline keeps corners)"
-    )
-    return [Finding("suspicious", text, np.array(places))]
-
-
 def refuse_strays(curves: Sequence[DrawnCurve], tolerance: float, size: float) -> None:
     """Raise InputError where most curves are shorter than the tolerance, a share of a size that
     something far away from them makes."""
@@ -146,20 +126,3 @@ def refuse_upright(
             "out",
             field=curve.label,
         )
-
-
-def _departure(curve: DrawnCurve) -> tuple[float, float, np.ndarray]:
-    """How far the smooth curve leaves the straight pieces' middles: as a length, as a share of the
-    piece (the largest of each), and where that is."""
-    from scipy.interpolate import CubicSpline
-
-    points = np.concatenate([curve.points, curve.points[:1]]) if curve.closed else curve.points
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    if len(points) < 3 or not steps.all():
-        return 0.0, 0.0, points[0]
-    t = np.concatenate([[0.0], np.cumsum(steps)])
-    spline = CubicSpline(t, points, bc_type="periodic" if curve.closed else "natural")
-    middles = 0.5 * (points[:-1] + points[1:])
-    away = np.linalg.norm(spline(0.5 * (t[:-1] + t[1:])) - middles, axis=1)
-    shares = away / steps
-    return float(away.max()), float(shares.max()), middles[int(shares.argmax())]

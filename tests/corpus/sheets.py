@@ -195,12 +195,12 @@ def sheet(layer: str = "0") -> bytes:
 
 
 case("sheet.dxf", Net(options={"largest_part": True}, findings={"skipped": 2}))(sheet)
-case("sheet_as_it_is.dxf", Refused("6 of 13 curves hang together: --largest-part reads them"))(
+case("sheet_as_it_is.dxf", Refused("6 of 14 curves hang together: --largest-part reads them"))(
     sheet
 )
 case(
     "sheet_with_a_layer.dxf",
-    Refused("6 of 13 curves hang together: --layer 'LATHS' reads them alone"),
+    Refused("6 of 14 curves hang together: --layer 'LATHS' reads them alone"),
 )(lambda: sheet("LATHS"))
 case("sheet_by_its_layer.dxf", Net(options={"layers": ["LATHS"]}))(lambda: sheet("LATHS"))
 
@@ -318,3 +318,42 @@ for _kind, _content, _words in (
     ("step", b"ISO-10303-21;\nHEADER;\n", "is a solid model by its content (STEP)"),
 ):
     case(f"{_kind}_by_another_name.dxf", Refused(_words))(lambda content=_content: content)
+
+
+# -- corners --------------------------------------------------------------------------------------
+
+
+@case("laths_in_one_polyline.dxf", Net(length=12.0, findings={"hinged": 1, "suspicious": 1}))
+def _zigzag() -> bytes:
+    """Three laths and the ways between them, drawn in one go, and two laths across."""
+
+    def draw(document: Any, space: Any) -> None:
+        way = [(0, 0), (2, 0), (2, 1), (2, 2), (0, 2)]
+        space.add_lwpolyline([*way, (0, 1), (0, 0)])
+        lines(space, [((0, 1), (2, 1)), ((1, 0), (1, 2))])
+
+    return dxf(draw)
+
+
+@case("frame_of_laths.dxf", Net(length=12.0, findings={"hinged": 1, "suspicious": 1}))
+def _frame_of_laths() -> bytes:
+    """The outermost laths drawn as a rectangle."""
+
+    def draw(document: Any, space: Any) -> None:
+        space.add_lwpolyline([(0, 0), (2, 0), (2, 2), (0, 2)], close=True)
+        lines(space, [((0, 1), (2, 1)), ((1, 0), (1, 2))])
+
+    return dxf(draw)
+
+
+@case("outlines_of_wide_laths.dxf", Net(findings={"suspicious": 1}))
+def _wide() -> bytes:
+    """Ten times as long as they are wide."""
+
+    def draw(document: Any, space: Any) -> None:
+        for (x0, y0), (x1, y1) in NET:
+            dx, dy = (0.0, 0.12) if y0 == y1 else (0.12, 0.0)
+            corners = [(x0 - dx, y0 - dy), (x1 - dx, y1 - dy), (x1 + dx, y1 + dy)]
+            space.add_lwpolyline([*corners, (x0 + dx, y0 + dy)], close=True)
+
+    return dxf(draw)

@@ -93,7 +93,9 @@ def test_units_agree_after_the_command_that_the_error_names(repository, tmp_path
     told(capsys, "import", old, "--unit", "mm", "--out", folder / "b.json")
     data = json.loads((folder / "b.json").read_text())
     (folder / "b.json").write_text(json.dumps(data | {"name": "other"}))
-    assert main(["optimize", str(folder), "--out", str(tmp_path / "run"), "--parts", "4"]) == 2
+    assert (
+        main(["optimize", str(folder), "--out", str(tmp_path / "run"), "--parts", "linear=4"]) == 2
+    )
     said = capsys.readouterr().err
     assert "kop import FILE --unit m --force-unit N --out NEW" in said
     command = ("--unit", "m", "--force-unit", "N", "--out", folder / "b.json", "--overwrite")
