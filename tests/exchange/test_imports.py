@@ -231,9 +231,9 @@ class TestPreviews:
         status, _, error = imported(capsys, corpus / "lines.obj", "--preview", page)
         assert status == 2 and "exists already" in error and page.read_text() == "mine"
 
-    def test_one_of_them_is_needed(self, corpus, capsys):
-        status, _, error = imported(capsys, corpus / "lines.obj")
-        assert status == 2 and "give --out, --preview or both" in error
+    def test_without_either_the_summary_alone_is_given(self, corpus, capsys):
+        status, told, _ = imported(capsys, corpus / "lines.obj")
+        assert status == 0 and "6 of 6 drawn pieces" in told
 
 
 def test_nets_far_away_are_designs_near_the_origin_and_files_give_the_place_back(tmp_path):
