@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from ..analysis.load_check import LoadCheck
 from ..analysis.verdict import Buildable
 from ..search.result import KitResult
 from ..structures.strength import beyond_limit
@@ -141,12 +142,25 @@ def _lines(
         )
     if verdict is not None:
         lines += _opening(verdict)
-        lines += [
-            ("loads", f"{check.case.name}: fails at {check.critical:.3g} times", True)
-            for check in verdict.loads
-            if check.critical < check.case.factor
-        ]
+        lines += [_load(check, result.units, _fails(check, verdict)) for check in verdict.loads]
     return lines
+
+
+def _fails(check: LoadCheck, verdict: Buildable) -> bool:
+    """Whether a load case is one of those that stop a design."""
+    return any(
+        s.cause == "load" and s.why.startswith(f"under {check.case.name} ") for s in verdict.stops
+    )
+
+
+def _load(check: LoadCheck, units: Units | None, bad: bool) -> tuple[str, str, bool]:
+    """What a load case does, its stress under the factored loads."""
+    if not check.stable or check.loaded is None:
+        return "loads", f"{check.case.name}: fails at {check.critical:.3g} times", True
+    text = f"{check.case.name}: deflects {in_millimetres(check.deflection, units)}"
+    if check.utilisation is not None:
+        text += f", stress {100 * check.utilisation:.0f} % of the limit"
+    return "loads", text, bad
 
 
 def _off(fit: dict[str, float], units: Units | None) -> list[tuple[str, str, bool]]:

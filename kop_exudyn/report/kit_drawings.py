@@ -152,6 +152,23 @@ def stage_rows(result: KitResult) -> tuple[list[str], list[list]]:
     return ["design", *(f"{stage.replace('_', ' ')}, %" for stage in (INPUT, *stages))], rows
 
 
+def displaced_rows(result: KitResult) -> tuple[list[str], list[list]]:
+    """Headings and rows: how far every design's joints are from their own places in the target
+    after every stage at most, % of its size."""
+    stages = [stage for stage in STAGES if stage in result.stages]
+    rows: list[list] = []
+    for n, design in enumerate(result.designs):
+        outcomes = (result.stages[stage].designs[n] for stage in stages)
+        found = [
+            100 * float(outcome.fit.displacements.max()) / outcome.fit.size
+            if isinstance(outcome, Evaluation)
+            else None
+            for outcome in outcomes
+        ]
+        rows.append([design.name, *found])
+    return ["design", *(f"{stage.replace('_', ' ')}, %" for stage in stages)], rows
+
+
 def final_states(result: KitResult) -> dict[tuple[str, str, str], Equilibrium]:
     """(design, stage, role) -> equilibrium, for all that were found.
 

@@ -29,6 +29,7 @@ from .kit_cards import (
     percent_explained,
 )
 from .kit_drawings import (
+    displaced_rows,
     drawn_designs,
     final_states,
     histories,
@@ -49,9 +50,10 @@ _FRAMES = 6  # states on the way to the opening in the viewer
 _LEGEND = (
     "Opens within: how far from the state shown the design ends that its assembly opens into, % of "
     "the target's size. Utilisation: the largest equivalent stress over the elastic limit in all "
-    "states. Softest mode: its eigenvalue in the deployed state over the input design's. Spread: "
-    "root mean square displacement of the joint that moves most under the workshop's errors. "
-    "Snapped: of sets of such errors. A dash: not known."
+    "states without loads; stress under a load: under the load times its factor. Softest mode: its "
+    "eigenvalue in the deployed state over the input design's. Spread: root mean square "
+    "displacement of the joint that moves most under the workshop's errors. Snapped: of "
+    "sets of such errors. A dash: not known."
 )
 
 
@@ -149,6 +151,11 @@ def _page(
         "Largest deviation of the joints, %. Input: the designs as given. Direct: every input "
         "element replaced by its part. Unrelaxed: parts then tuned. Published: by the published "
         "method, led and opened. Relaxed: elements still free. Assigned: built from the kit.",
+    )
+    page.table(
+        *displaced_rows(result),
+        "Largest distance of the joints from their own places on the target, %, which the search "
+        "looks at as well: joints that slide along the surface keep to it, but change the outline.",
     )
     page.text("\n\n".join(remarks(result, verdicts=bool(verdicts))))
     page.figure(

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.load_check import LoadCheck
 from ..analysis.verdict import Buildable, VerdictSettings, judge, judge_given
 from ..errors import SimulationFailure
 from ..fabrication.limits import cutting_problems
@@ -133,7 +134,12 @@ def verdict_rows(
         "snapped",
         "95 % within, %",
         *(
-            ["worst load", f"deflection, {unit_of('length', units)}", "critical factor"]
+            [
+                "worst load",
+                f"deflection, {unit_of('length', units)}",
+                "stress under it",
+                "critical factor",
+            ]
             if loaded
             else []
         ),
@@ -166,13 +172,22 @@ def _moved(verdict: Buildable) -> float | str | None:
 
 
 def _worst_load(verdict: Buildable) -> list[Any]:
-    """Name, deflection and critical factor of the load case that is nearest to its limits."""
+    """Name, deflection, utilisation under the factored loads and critical factor of the load case
+    that is nearest to its limits."""
     if not verdict.loads:
-        return [None, None, None]
-    worst = min(verdict.loads, key=lambda check: check.critical / check.case.factor)
+        return [None, None, None, None]
+    worst = max(verdict.loads, key=_use)
     deflection = None if np.isnan(worst.deflection) else worst.deflection
     factor = f"over {worst.critical:.3g}" if worst.beyond else f"{worst.critical:.3g}"
-    return [worst.case.name, deflection, factor]
+    return [worst.case.name, deflection, worst.utilisation, factor]
+
+
+def _use(check: LoadCheck) -> float:
+    """How much of its limits a load case uses: of stability, stress and deflection the most."""
+    shares = [check.case.factor / max(check.critical, 1e-9), check.utilisation or 0.0]
+    if np.isfinite(check.allowed) and not np.isnan(check.deflection):
+        shares.append(check.deflection / check.allowed)
+    return max(shares)
 
 
 def _cutting(verdict: Buildable) -> str | None:
@@ -192,6 +207,9 @@ def _margins(verdicts: Sequence[Buildable], units: Units | None) -> str:
     used = [v.largest for v in verdicts if v.largest is not None]
     if used:
         found.append(f"stress is at most {100 * max(used):.0f} % of the elastic limit")
+    if len(used) < len(verdicts):
+        whose = "the others'" if used else "their" if len(verdicts) > 1 else "its"
+        found.append(f"{whose} stress isn't judged (no elastic limit is given)")
     kept = [v.forgiveness for v in verdicts if v.forgiveness is not None]
     if any(one.samples for one in kept):
         worst = max(kept, key=lambda one: one.tolerance.length)

@@ -107,6 +107,9 @@ def test_a_load_that_no_kit_carries(study, capsys):
     text = unescape(re.sub(r"<[^>]+>", " ", page.split("</h1>")[1]))
     words = re.sub(r"\s+", " ", text).strip()
     assert words.startswith(" ".join(lines[:2])) and "Can they be built?" in words
+    # the design's card has the load that stops it, in the colour of what is wrong
+    assert re.search(r"<dd class=bad>a sack of sand: deflects [\d.]+\xa0mm", page)
+    assert "stress under it" in words
 
 
 class TestWords:
@@ -128,6 +131,15 @@ class TestWords:
         first, second = verdict_lines(three)
         assert first.startswith("All 3 designs can")
         assert second.startswith("Opened from the assembly") and "at most 50 %" in second
+        assert "isn't judged" not in second
+
+    def test_stress_that_can_not_be_judged_is_said(self):
+        """Without a limit no number is shown, and nothing would tell that none was looked at."""
+        known, unknown = Buildable("a", 0.0, {"rest": 0.5}), Buildable("b", 0.0, {"rest": None})
+        assert "their stress isn't judged" in verdict_lines([unknown, unknown])[1]
+        assert "the others' stress isn't judged" in verdict_lines([known, unknown])[1]
+        alone = verdict_lines([unknown])[1]
+        assert "its stress isn't judged" in alone and "it ends in the shape" in alone
 
     def test_rows_fit_their_headings(self):
         headings, rows = verdict_rows([Buildable("a"), Buildable("b", fabrication=("x",))])
