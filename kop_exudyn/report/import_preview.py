@@ -29,6 +29,7 @@ _MARKS = {
     "cleaned": ("P", PALETTE["orange"], "cleaned"),
     "suspicious": ("o", "#c00000", "look at"),
 }
+_NUMBER_OFF = 9.0  # points that a curve's number is off its end
 _MOST_LABELS = 60  # curves that are named in the drawing
 _SECTOR = 0.28  # of the median span, radius of the opening's sectors
 _MOST_SECTORS = 400
@@ -129,15 +130,25 @@ def _plan_figure(drawn: DrawnNetwork, findings: Sequence[Finding], unit: str) ->
                 ax.annotate(
                     str(number),
                     line[0],
-                    xytext=(-7, -7),
+                    xytext=tuple(_NUMBER_OFF * _outwards(line)),
                     textcoords="offset points",
                     size=7,
                     color=colours[number],
+                    ha="center",
+                    va="center",
                 )
         _marks(ax, drawn, findings)
         ax.margins(0.06)
         ax.autoscale_view()
     return figure
+
+
+def _outwards(line: np.ndarray) -> np.ndarray:
+    """(2,) direction in which a curve (n, 2) would go on beyond its first end: curves that meet
+    there have different ones, so that their numbers stand apart."""
+    step = line[0] - line[min(len(line) - 1, 1 + len(line) // 20)]
+    length = np.linalg.norm(step)
+    return step / length if length > 0 else np.array([-1.0, 0.0])
 
 
 def _smooth(drawn: DrawnNetwork, net: CurveNetwork | None, number: int) -> np.ndarray:
