@@ -598,6 +598,7 @@ class TestSizes:
             (("tradeoff", "--parts", "linear=0:2"), "at least 1"),
             (("tradeoff", "--parts", "linear=2:4,angular=2:3"), "need as many numbers"),
             (("optimize", "--max-deviation", "0"), "positive number"),
+            (("optimize", "--max-deviation", "0.5 %", "--kit", "KIT"), "without --kit and --stock"),
             (("optimize", "--max-deviation", "1", "--cost", "colour=1"), "expected part=W"),
             (("optimize", "--parts", "linear=2,angular=2", "--cost", "part=1"), "give it with"),
             (("optimize", "--max-deviation", "1", "--kit", "KIT"), "without --kit and --stock"),

@@ -13,6 +13,7 @@ from .values import (
     not_negative,
     not_negative_number,
     part_counts,
+    percent,
     positive,
     positive_number,
     term_weights,
@@ -77,7 +78,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--max-deviation",
-        type=positive_number,
+        type=percent,
         metavar="PERCENT",
         help="find the smallest kit that keeps every design within this deviation from its target, "
         "in %% of its size; the search begins with --parts (default: 8 of each kind)",

@@ -100,6 +100,11 @@ def positive_number(text: str) -> float:
     return value[0]
 
 
+def percent(text: str) -> float:
+    """``1.5`` or ``1.5%`` as 1.5: a share in percent, larger than 0."""
+    return positive_number(text.strip().removesuffix("%").strip())
+
+
 def number_pair(text: str) -> tuple[float, float]:
     """``30,4`` as (30.0, 4.0); whether they make sense is checked where they are used."""
     values = _numbers(text, (2,))
