@@ -80,7 +80,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from dataclasses import replace
 
-    from ..analysis.model_sensitivities import ModelSensitivities
     from ..analysis.simulation import simulate
     from ..errors import SimulationFailure
     from ..files.json_files import to_json
@@ -99,6 +98,8 @@ def run(args: argparse.Namespace) -> int:
         found = simulate(design, loads, engine=args.engine)
         result = found.to_dict()
         if args.sensitivities:
+            from ..analysis.model_sensitivities import ModelSensitivities
+
             result["sensitivities"] = ModelSensitivities(found, found.loaded is not None).table()
     except SimulationFailure as failure:
         if args.json:

@@ -25,7 +25,17 @@ import numpy as np
 from ..rods.rotations import axes_along_z, hat
 from ..scene.scene import Scene
 from .exudyn_layout import Carrier, Layout
-from .exudyn_library import exu, item
+from .exudyn_library import (
+    HELD_COORDINATE,
+    HINGE,
+    JOINT,
+    MARKER_OF_BODY,
+    MARKER_OF_COORDINATE,
+    MARKER_OF_NODE,
+    RIGID_BODY,
+    exu,
+    item,
+)
 
 _GROUND = -1
 _I3 = np.eye(3)
@@ -121,11 +131,9 @@ class Joints:
         self._mbs, self._layout, self._nodes, self._unit = mbs, layout, nodes, unit
         self._ground = mbs.AddObject(item.ObjectGround())
         fixed = mbs.AddNode(item.NodePointGround())
-        self._fixed = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0))
+        self._fixed = mbs.AddMarker(MARKER_OF_COORDINATE(nodeNumber=fixed, coordinate=0))
         self._bodies = {
-            c.node: mbs.AddObject(
-                item.ObjectRigidBody(mass=1, inertia=[1, 1, 1, 0, 0, 0], nodeNumber=nodes[c.node])
-            )
+            c.node: mbs.AddObject(RIGID_BODY(nodeNumber=nodes[c.node]))
             for c in layout.carriers.values()
             if c.rigid
         }
@@ -145,9 +153,9 @@ class Joints:
     def _marker(self, end: _End) -> Any:
         if end.node == _GROUND or end.place.any():
             body = self._ground if end.node == _GROUND else self._bodies[end.node]
-            return self._mbs.AddMarker(item.MarkerBodyRigid(bodyNumber=body, localHT=end.pose))
+            return self._mbs.AddMarker(MARKER_OF_BODY(bodyNumber=body, localHT=end.pose))
         node = self._nodes[end.node]
-        return self._mbs.AddMarker(item.MarkerNodeRigid(nodeNumber=node, localHT=end.pose))
+        return self._mbs.AddMarker(MARKER_OF_NODE(nodeNumber=node, localHT=end.pose))
 
     def _add(
         self,
@@ -160,9 +168,9 @@ class Joints:
     ) -> None:
         markers = [self._marker(first), self._marker(second)]
         if axes == _REVOLUTE:
-            joint = item.ObjectJointRevoluteZ(markerNumbers=markers)
+            joint = HINGE(markerNumbers=markers)
         else:
-            joint = item.ObjectJointGeneric(markerNumbers=markers, constrainedAxes=list(axes))
+            joint = JOINT(markerNumbers=markers, constrainedAxes=list(axes))
         number = self._mbs.AddObject(joint)
         self._joints.append(_Joint(number, first, second, axes, condition, markers[0], hinge, body))
 
@@ -197,10 +205,8 @@ class Joints:
             carrier = self._layout.carriers[body, -1]
             node = self._nodes[carrier.node]
             for axis in np.flatnonzero(held[body, :3]).tolist():
-                marker = self._mbs.AddMarker(
-                    item.MarkerNodeCoordinate(nodeNumber=node, coordinate=axis)
-                )
-                connector = item.ObjectConnectorCoordinate(markerNumbers=[self._fixed, marker])
+                marker = self._mbs.AddMarker(MARKER_OF_COORDINATE(nodeNumber=node, coordinate=axis))
+                connector = HELD_COORDINATE(markerNumbers=[self._fixed, marker])
                 self._held.append((self._mbs.AddObject(connector), body, axis))
             if held[body, 3:].any():
                 axes = (0, 0, 0, *held[body, 3:].astype(int).tolist())

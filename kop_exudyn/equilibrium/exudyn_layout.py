@@ -83,10 +83,9 @@ def layout_of(scene: Scene) -> Layout:
     scene_node = unique.tolist()
     levels, element_nodes = _span(element_nodes, len(unique), scene_node)
     frames: dict[tuple[int, int], list[int]] = {}
-    for node, origin in enumerate(scene_node):
-        frames.setdefault((int(scene.node_body[origin]), int(scene.node_hinge[origin])), []).append(
-            node
-        )
+    of_nodes = zip(scene.node_body[scene_node].tolist(), scene.node_hinge[scene_node].tolist())
+    for node, key in enumerate(of_nodes):
+        frames.setdefault(key, []).append(node)
     for body in range(scene.n_bodies):
         frames.setdefault((body, -1), [])
     carriers, ties = {}, []
@@ -96,12 +95,11 @@ def layout_of(scene: Scene) -> Layout:
         if scene.hinge_centre[scene.node_hinge[n]].any()
     }
     count = len(scene_node)
+    offset = np.any(scene.node_offset != 0, axis=1)
     for key, nodes in sorted(frames.items()):
         origins = [scene_node[n] for n in nodes]
-        centred = [n for n, o in zip(nodes, origins) if not scene.node_offset[o].any()]
-        plain = all(not scene.node_offset[o].any() for o in origins) and not (
-            key[1] < 0 and key[0] in eccentric
-        )
+        centred = [n for n, o in zip(nodes, origins) if not offset[o]]
+        plain = len(centred) == len(nodes) and not (key[1] < 0 and key[0] in eccentric)
         if centred and plain:
             carriers[key] = Carrier(
                 *key, centred[0], scene.node_frame[scene_node[centred[0]]], False

@@ -9,6 +9,7 @@ looked at, and the rod's own forces in a case that tells the meanings apart.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -45,6 +46,35 @@ def quiet_settings() -> exu.SimulationSettings:
     static.useLoadFactor = False  # a residual is that of the whole load, whenever it is asked for
     settings.solution.file.write = False
     return settings
+
+
+class ItemKind:
+    """Items of one kind, as a model has hundreds of: each is a sample's settings with some of its
+    own, in a dictionary, which Exudyn takes like the item itself. To make an item's object takes
+    several times as long.
+
+    sample : an item, as `item.MarkerNodeRigid()`
+    """
+
+    def __init__(self, sample: Any):
+        self._settings = dict(sample)
+
+    def __call__(self, **own: Any) -> dict[str, Any]:
+        """The settings of an item. KeyError for one that the kind doesn't have."""
+        for name in own:
+            self._settings[name]
+        return {**self._settings, **own}
+
+
+NODE = ItemKind(item.NodeRigidBodyRotVecLG())
+BEAM = ItemKind(item.ObjectBeamGeometricallyExact())
+RIGID_BODY = ItemKind(item.ObjectRigidBody(mass=1, inertia=[1, 1, 1, 0, 0, 0]))
+MARKER_OF_BODY = ItemKind(item.MarkerBodyRigid())
+MARKER_OF_NODE = ItemKind(item.MarkerNodeRigid())
+MARKER_OF_COORDINATE = ItemKind(item.MarkerNodeCoordinate())
+HELD_COORDINATE = ItemKind(item.ObjectConnectorCoordinate())
+HINGE = ItemKind(item.ObjectJointRevoluteZ())
+JOINT = ItemKind(item.ObjectJointGeneric())
 
 
 def rod_section(stiffness: np.ndarray) -> exu.BeamSection:

@@ -29,7 +29,7 @@ from ..scene.state import State
 from .exudyn_forces import SceneForces, angles_about
 from .exudyn_joints import Joints
 from .exudyn_layout import layout_of
-from .exudyn_library import exu, item, quiet_settings, rod_section
+from .exudyn_library import BEAM, MARKER_OF_NODE, NODE, exu, item, quiet_settings, rod_section
 
 
 @dataclass(frozen=True)
@@ -97,18 +97,20 @@ class ExudynModel:
         )
         self._reference = self._reference_coordinates(self._lengths)
         self._nodes = [
-            mbs.AddNode(item.NodeRigidBodyRotVecLG(referenceCoordinates=row.tolist()))
-            for row in self._reference
+            mbs.AddNode(NODE(referenceCoordinates=row)) for row in self._reference.tolist()
         ]
         sections: dict[bytes, exu.BeamSection] = {}
         self._beams = []
         units = self.force * np.repeat([1.0, self.length**2], 3)
-        for nodes, K, L in zip(layout.element_nodes, scene.stiffness, self._lengths):
-            section = sections.setdefault(K.tobytes(), rod_section(K / units))
-            beam = item.ObjectBeamGeometricallyExact(
+        lengths = (self._lengths / self.length).tolist()
+        for nodes, K, length in zip(layout.element_nodes.tolist(), scene.stiffness, lengths):
+            key = K.tobytes()
+            if key not in sections:
+                sections[key] = rod_section(K / units)
+            beam = BEAM(
                 nodeNumbers=[self._nodes[n] for n in nodes],
-                length=L / self.length,
-                sectionData=section,
+                length=length,
+                sectionData=sections[key],
             )
             self._beams.append(mbs.AddObject(beam))
 
@@ -117,7 +119,7 @@ class ExudynModel:
         self._weights = []
         if self.scene.weight is not None:
             for node in np.unique(self.layout.element_nodes).tolist():
-                marker = self._mbs.AddMarker(item.MarkerNodeRigid(nodeNumber=self._nodes[node]))
+                marker = self._mbs.AddMarker(MARKER_OF_NODE(nodeNumber=self._nodes[node]))
                 load = item.LoadForceVector(markerNumber=marker, loadVector=[0, 0, 0])
                 self._weights.append((node, self._mbs.AddLoad(load)))
 

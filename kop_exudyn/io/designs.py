@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from ..errors import InputError
-from ..files.documents import check_envelope, check_range, check_schema, has_schema
+from ..files.documents import check_envelope, check_range, check_schema, has_schema, is_own
 from ..files.files import reason_of
 from ..files.json_files import JSON_ENDINGS, read_json
 from ..structures.base import Design, design_from_dict, foreign_format
@@ -27,10 +27,12 @@ def load_design(path: str | Path) -> Design:
     Raises InputError naming the file, the field and the value when anything is wrong with it.
     """
     data = read_json(path)
-    if isinstance(data, dict) and str(data.get("format", "")).startswith("kop_exudyn/"):
+    own = is_own(data)
+    if own:
         check_envelope(data, "design", DESIGN_VERSION, source=path)  # or another file of ours
     check_range(data, source=path)
-    if (foreign := foreign_format(data)) is not None:
+    # to look for other programs' formats takes all classes' modules, which take long to import
+    if not own and (foreign := foreign_format(data)) is not None:
         try:
             return foreign.read(data, str(path))
         except InputError as error:

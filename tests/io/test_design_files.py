@@ -1,11 +1,14 @@
 """Design files: every mistake is named with file, field and value."""
 
 import copy
+import json
 from dataclasses import dataclass
 
+import numpy as np
 import pytest
 
 from kop_exudyn.errors import InputError
+from kop_exudyn.files import documents
 from kop_exudyn.files.documents import check_envelope, check_schema
 from kop_exudyn.io import designs as designs_module
 from kop_exudyn.io.datasets import load_designs
@@ -52,6 +55,68 @@ def changed(data: dict, path: list, value) -> dict:
 
 def test_the_example_is_valid(c_shell_data):
     check_schema(c_shell_data, "c_shell")
+
+
+def damaged(data, rng):
+    """A copy of a design file's content, one place of which, wherever it is, is something else, is
+    missing, or has a field more."""
+    data = copy.deepcopy(data)
+    places, waiting = [], [data]
+    while waiting:
+        place = waiting.pop()
+        keys = list(place) if isinstance(place, dict) else range(len(place))
+        for key in keys:
+            places.append((place, key))
+            if isinstance(place[key], (dict, list)):
+                waiting.append(place[key])
+    place, key = places[rng.integers(len(places))]
+    others = (
+        None,
+        True,
+        -1,
+        0,
+        2,
+        2.0,
+        1e-9,
+        2**70,
+        float("nan"),
+        "",
+        "up",
+        [],
+        [1.5],
+        {},
+        {"x": 1},
+    )
+    match rng.integers(4):
+        case 0:
+            del place[key]
+        case 1 if isinstance(place, dict):
+            place[f"{key}x"] = place[key]
+        case _:
+            place[key] = others[rng.integers(len(others))]
+    return data
+
+
+def complaint(data, schema):
+    """What `check_schema` says."""
+    try:
+        check_schema(data, schema)
+    except InputError as error:
+        return str(error)
+    return None
+
+
+@pytest.mark.parametrize("model", ["conformals/01_sinh", "grids/01_dome", "umbrellas/hill"])
+def test_what_is_accepted_quickly_is_what_is_accepted(repository, model, monkeypatch):
+    """Two validators read the same schemas: nothing passes the quick one that the other refuses."""
+    data = json.loads((repository / "models" / f"{model}.json").read_text(encoding="utf-8"))
+    rng = np.random.default_rng(5)
+    files = [damaged(data, rng) for _ in range(150)]
+    schemas = ["design", data["class"]]
+    found = [complaint(file, schema) for file in files for schema in schemas]
+    monkeypatch.setattr(documents, "_is_accepted", lambda data, schema: False)
+    assert found == [complaint(file, schema) for file in files for schema in schemas]
+    assert 50 < sum(words is None for words in found) < 250
 
 
 @pytest.mark.parametrize(
