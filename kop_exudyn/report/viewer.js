@@ -130,6 +130,11 @@
       return {design, x: w * (k % columns) / across, y: h * row / rows, w: w / across, h: h / rows};
     });
     $("labels").replaceChildren(...tiles.map(label));
+    [...$("labels").children].forEach((box, k) => {  // drawings begin below their captions
+      const tile = tiles[k], below = Math.min(box.offsetTop + box.offsetHeight - tile.y, 0.3 * tile.h);
+      tile.y += below;
+      tile.h -= below;
+    });
   }
 
   function label(tile) {
