@@ -109,14 +109,6 @@ class Sensitivities:
             return np.zeros(self._system.scene.n_parameters)
         return -(self._residual_q.T @ self._border.column) / self._border.schur
 
-    @cached_property
-    def opening_derivative(self) -> tuple[Numbers, float]:
-        """Derivatives of the free unknowns (n_free,) and of the torque in the opening angle."""
-        if self._border is None:
-            raise ValueError("the scene has no opening angle")
-        d, t = bordered_solve(self.system, self._border, np.zeros(self._n), 1.0)
-        return d, float(t)
-
     def adjoint(self, dofs: Indices, cotangent: Numbers) -> Parameters:
         """Gradient (n_parameters,) of J given dJ/d(unknowns) (m,) at some unknowns: one solve, no
         x_q."""

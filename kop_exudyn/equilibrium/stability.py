@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 
 from .direction import Border, bordered_solve, factorise_convex
 from .equilibria import Equilibrium
@@ -85,14 +84,3 @@ def zero_mode(system: System, border: Border | None) -> float | None:
 def _without_symmetry(n: int) -> np.ndarray:
     """A fixed vector (n,) that no symmetric mode is orthogonal to: results are reproducible."""
     return np.sin(np.arange(1, n + 1) * 0.7390851)
-
-
-def stiffness_matrix(system: System, equilibrium: Equilibrium | None = None) -> sp.csc_matrix:
-    """The full symmetric Hessian (n_free, n_free), for looking at and for other people's solvers.
-
-    equilibrium : where it is taken; default: whatever state was assembled last
-    """
-    if equilibrium is not None:
-        system.linearise(equilibrium.state, equilibrium.q)
-    upper = system.sparsity.free_matrix(system.values)
-    return (upper + sp.triu(upper, 1).T).tocsc()

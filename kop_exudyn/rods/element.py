@@ -137,13 +137,6 @@ def length_derivative(
     )
 
 
-def rest_strain_derivative(
-    strain: np.ndarray, lengths: np.ndarray, stiffness: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """dW/dgamma (n, 6) and the diagonal of dsigma/dgamma (n, 6) at fixed poses: -K e and -K."""
-    return -stiffness * strain, -stiffness
-
-
 def _derivative_of_product(
     phi: np.ndarray, s: np.ndarray, p: np.ndarray, c: np.ndarray, c_s: np.ndarray
 ) -> np.ndarray:

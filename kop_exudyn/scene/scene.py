@@ -132,15 +132,6 @@ class Scene:
         )
 
     @cached_property
-    def plain_nodes(self) -> np.ndarray:
-        """(N,) bool: nodes that coincide with their body, axes included."""
-        return (
-            (self.node_hinge < 0)
-            & (self.node_offset == 0).all(1)
-            & (self.node_frame == np.eye(3)).all((1, 2))
-        )
-
-    @cached_property
     def length_scale(self) -> float:
         """A length typical of the elements, from the initial geometry; makes tolerances independent
         of units."""
@@ -226,13 +217,6 @@ class Scene:
             rotations,
             np.where(self.pinned[n:], at.angles, state.angles),
         )
-
-    def held_at(self, state: State) -> Scene:
-        """The same scene with its pins where a state has them: supports that have been moved.
-
-        state : becomes the scene's initial one
-        """
-        return replace(self, initial=state)
 
     def hinge_turns(self, angles: np.ndarray) -> np.ndarray:
         """E(a) (n_hinges, 3, 3), turns about the hinges' axes."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..files.arrays import numbers_of
-from ..rods.rotations import compose_increments, log_so3
+from ..rods.rotations import compose_increments
 
 _ORTHOGONAL = 1e-6
 
@@ -34,12 +34,6 @@ class State:
         pose = increment[: 6 * n].reshape(n, 6)
         rotations = compose_increments(self.rotations, pose[:, 3:])
         return State(self.positions + pose[:, :3], rotations, self.angles + increment[6 * n :])
-
-    def increment_to(self, other: State) -> np.ndarray:
-        """The increment (6 n_bodies + n_hinges,) that moves this state to the other one."""
-        turn = log_so3(np.swapaxes(self.rotations, 1, 2) @ other.rotations)
-        pose = np.concatenate([other.positions - self.positions, turn], axis=1)
-        return np.concatenate([pose.ravel(), other.angles - self.angles])
 
     def transformed(self, rotation: np.ndarray, translation: np.ndarray) -> State:
         """The state after a rigid motion x -> rotation x + translation."""

@@ -93,17 +93,6 @@ class FitResult:
         )
         return rows - self.motions @ (self.motions.T @ rows)
 
-    def gauss_newton_factor(self) -> np.ndarray:
-        """R (3n, 3n), the factor of the Gauss-Newton Hessian R^T R of T in x, rigid motions
-        eliminated."""
-        return self.weighted_rows(np.eye(3 * len(self.blocks)))
-
-    def gauss_newton(self) -> np.ndarray:
-        """(3n, 3n) Gauss-Newton Hessian of T in x: exact but for terms that vanish with the
-        residual."""
-        factor = self.gauss_newton_factor()
-        return factor.T @ factor
-
 
 # joints (n, 3), closest points, T, dT/dy (n, 3)
 _Placed = tuple[np.ndarray, Closest, float, np.ndarray]

@@ -171,7 +171,7 @@ def test_supports_that_have_been_moved_are_the_scenes(strut, turn):
         positions, rotations = state.positions.copy(), state.rotations.copy()
         positions[8] = scene.initial.positions[8] + share * np.array([-0.02, 0.1, 0.0])
         rotations[8] = exp_so3(share * np.array([turn, 0.0, 0.0]))
-        moved = scene.held_at(State(positions, rotations, state.angles))
+        moved = replace(scene, initial=State(positions, rotations, state.angles))
         system = System(moved)
         eq = refine(system, solve(system, np.zeros(0)))
         state = eq.state

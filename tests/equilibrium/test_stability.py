@@ -8,11 +8,12 @@ import scipy.linalg
 import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.states import stiffness_matrix
 
 from kop_exudyn.equilibrium.direction import Border, bordered_solve, factorise_convex, is_convex
 from kop_exudyn.equilibrium.factorisation import factorisation
 from kop_exudyn.equilibrium.newton import solve
-from kop_exudyn.equilibrium.stability import softest_mode, stiffness_matrix
+from kop_exudyn.equilibrium.stability import softest_mode
 from kop_exudyn.equilibrium.system import System
 from kop_exudyn.scene.loads import DeadForces
 
@@ -68,7 +69,7 @@ def test_bordered_solves(wheel):
     case = wheel()
     system = System(case.scene)
     solve(system, case.q, opening=case.opening)
-    K, c = stiffness_matrix(system).toarray(), system.constraint
+    K, c = stiffness_matrix(system), system.constraint
     shift, border = factorise_convex(system)
     assert shift == 0.0
     rng = np.random.default_rng(0)
@@ -81,7 +82,7 @@ def test_bordered_solves(wheel):
 
 def dense_lowest(system) -> tuple[float, np.ndarray]:
     """Lowest eigenpair of K v = lambda M v on the constraint's kernel."""
-    K, M = stiffness_matrix(system).toarray(), np.diag(system.metric)
+    K, M = stiffness_matrix(system), np.diag(system.metric)
     if system.constraint is not None:
         Z = scipy.linalg.null_space(system.constraint[None])
         values, vectors = scipy.linalg.eigh(Z.T @ K @ Z, Z.T @ M @ Z)

@@ -53,6 +53,13 @@ def motion(seed=1):
     return Placement(Rotation.random(random_state=rng).as_matrix(), rng.normal(size=3))
 
 
+def gauss_newton(fit):
+    """(3n, 3n) model of the Hessian in the joints: exact but for terms that vanish with the
+    residual."""
+    factor = fit.weighted_rows(np.eye(3 * len(fit.blocks)))
+    return factor.T @ factor
+
+
 @pytest.mark.parametrize("level", [None, 0.01])
 @pytest.mark.parametrize("share", [0.1, 0.7, 1.0])
 def test_gradient_by_taylor(share, level):
@@ -100,7 +107,7 @@ def test_gauss_newton_is_exact_for_small_residuals(noise, tolerance, level):
     exact = (fitting(x + h * direction).gradient - fitting(x - h * direction).gradient).ravel() / (
         2 * h
     )
-    model = fit.gauss_newton() @ direction.ravel()
+    model = gauss_newton(fit) @ direction.ravel()
     assert np.linalg.norm(exact - model) < tolerance * np.linalg.norm(exact)
     assert direction.ravel() @ model == pytest.approx(
         np.sum(fit.weighted_rows(direction.reshape(-1, 1)) ** 2)
@@ -120,8 +127,8 @@ def test_gauss_newton_equals_the_schur_complement():
     rigid = np.column_stack([*turns, np.tile(np.eye(3), (len(x), 1))])
     mixed = hessian @ rigid
     expected = hessian - mixed @ np.linalg.solve(rigid.T @ mixed, mixed.T)
-    np.testing.assert_allclose(fit.gauss_newton(), expected, atol=1e-13)
-    assert np.abs(fit.gauss_newton() @ rigid).max() < 1e-13
+    np.testing.assert_allclose(gauss_newton(fit), expected, atol=1e-13)
+    assert np.abs(gauss_newton(fit) @ rigid).max() < 1e-13
 
 
 def test_rigid_motions_change_nothing():
@@ -137,7 +144,7 @@ def test_units_scale_out():
     fit, scaled = TargetFitting(TARGET)(x), TargetFitting(saddle_target(unit=unit))(unit * x)
     assert scaled.value == pytest.approx(unit**2 * fit.value, rel=1e-11)
     np.testing.assert_allclose(scaled.gradient, unit * fit.gradient, atol=1e-9)
-    np.testing.assert_allclose(scaled.gauss_newton(), fit.gauss_newton(), atol=1e-9)
+    np.testing.assert_allclose(gauss_newton(scaled), gauss_newton(fit), atol=1e-9)
     assert scaled.max_percent == pytest.approx(fit.max_percent, rel=1e-9)
     assert scaled.mean_percent == pytest.approx(fit.mean_percent, rel=1e-9)
 
@@ -184,7 +191,7 @@ def test_collinear_joints(share):
         TARGET.vertices, TARGET.faces, np.outer(np.linspace(-1, 1, 4), [1, 0, 0]), TARGET.size
     )
     fit = TargetFitting(line, share)(np.outer(np.linspace(-1, 1.1, 4), [0, 1, 0]))
-    assert np.isfinite(fit.gradient).all() and np.isfinite(fit.gauss_newton()).all()
+    assert np.isfinite(fit.gradient).all() and np.isfinite(gauss_newton(fit)).all()
     assert fit.max_percent < 5
 
 
