@@ -141,7 +141,8 @@ def _loops_of_pieces(
             label = f"{curves[start].label} and {len(chain) - 1} more"
             loops[start] = replace(curves[start], points=ways[0], closed=True, label=label), ways[1]
             gone |= {k for k, _ in chain}
-    if len(loops) < 2:  # a single one may be a linkage that is nearly closed
+    # laths of a net that are hinged at their tips go round narrow loops as well, but few of them
+    if 2 * len(gone) < len(curves):
         return list(curves), list(flat)
     kept = [
         loops[k] if k in loops else (curves[k], flat[k])

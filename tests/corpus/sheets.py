@@ -346,6 +346,19 @@ def _frame_of_laths() -> bytes:
     return dxf(draw)
 
 
+_RISING, _FALLING = range(-19, 20, 2), range(1, 40, 2)
+_MET = [(a, b) for a in _RISING for b in _FALLING if abs(a) <= b <= 40 - abs(a)]
+_LAID = sum(np.sqrt(2) * (20 - abs(a)) for a in _RISING)
+
+
+@case("diagonals_in_a_square.obj", Net(40, len(_MET), 2 * _LAID, findings={"hinged": 1}))
+def _diagonals() -> str:
+    """The longest ones, with the short ones that they are hinged with, go round narrow loops."""
+    up = [((max(0, -a), max(0, a)), (20 - max(0, a), 20 - max(0, -a))) for a in _RISING]
+    down = [((max(0, b - 20), min(20, b)), (min(20, b), max(0, b - 20))) for b in _FALLING]
+    return obj([*up, *down])
+
+
 @case("outlines_of_wide_laths.dxf", Net(findings={"suspicious": 1}))
 def _wide() -> bytes:
     """Ten times as long as they are wide."""
