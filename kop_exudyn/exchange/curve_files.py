@@ -101,11 +101,11 @@ def _obj_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
     skipped = [f"{n} {name} elements" for name, n in found.left_out.items()]
     if found.faces:
         skipped.append(f"{len(found.faces)} faces, which are a surface's: --edges reads them")
-    unit = _said_unit(content)
+    unit = said_unit(content)
     return Drawing(curves, unit, None if unit is None else LENGTHS[unit], skipped)
 
 
-def _said_unit(content: bytes) -> str | None:
+def said_unit(content: bytes) -> str | None:
     """The unit of length that a comment before an OBJ file's elements says, as "# unit: mm" or, of
     Rhino, "# File units = millimeters"; None where none does, or it isn't known here."""
     for line in content[:_HEAD].decode("utf-8", "replace").splitlines():

@@ -14,6 +14,8 @@ from ..checks import LARGEST
 from ..errors import InputError
 from ..files.files import read_bytes
 from ..geometry.obj_files import parse_obj
+from ..units import LENGTHS
+from .curve_files import said_unit
 from .drawing import Drawing, DrawnCurve
 
 EDGE_SUFFIXES = (".obj", ".json")
@@ -52,7 +54,9 @@ def edges_of(path: Path) -> Drawing:
         DrawnCurve(points[[a, b]], False, f"edge from ({_text(points[a])}) to ({_text(points[b])})")
         for a, b in pairs
     ]
-    return Drawing([curve for curve in curves if np.ptp(curve.points, axis=0).any()])
+    unit = said_unit(content) if suffix == ".obj" else None
+    kept = [curve for curve in curves if np.ptp(curve.points, axis=0).any()]
+    return Drawing(kept, unit, None if unit is None else LENGTHS[unit])
 
 
 def _text(point: np.ndarray) -> str:

@@ -141,9 +141,10 @@ def _lines(text: str) -> Iterator[tuple[int, str]]:
 
 
 def _vertex(values: Sequence[str], place: str) -> list[float]:
-    """A vertex's place; a weight or a colour may follow."""
+    """A vertex's place, in the xy plane where two numbers are given; a weight or a colour may
+    follow three."""
     try:
-        point = [float(value) for value in values[:3]]
+        point = [float(value) for value in (*values, *["0"] * (len(values) == 2))[:3]]
     except ValueError:
         point = []
     if len(point) != 3 or not all(abs(value) <= LARGEST for value in point):

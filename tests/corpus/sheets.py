@@ -257,6 +257,9 @@ def quads(pick: str = "{}") -> str:
 
 
 case("edges_of_quads.obj", _EDGES)(quads)
+case("edges_of_quads_in_inches.obj", replace(_EDGES, unit="in"))(
+    lambda: "# File units = inches\n" + quads()
+)
 case("edges_of_quads_with_normals.obj", _EDGES)(lambda: quads("{}//1"))
 case("faces_without_curves.obj", Refused("6 faces, which are a surface's: --edges reads them"))(
     quads
