@@ -24,6 +24,7 @@ from ..scene.assembly import ENERGY
 from ..scene.state import State
 from .direction import border_of, bordered_solve, factorise_convex, is_convex, shift_unit
 from .equilibria import Equilibrium, Start
+from .iterate import Iterate, NewtonOptions
 from .softened import softened
 from .stability import rounding_of, softest_mode, zero_mode
 from .system import Energy, System
@@ -33,7 +34,6 @@ log = logging.getLogger(__name__)
 _QUICK = 2  # headway within so many further steps: the steps may grow again
 _MAX_RETURNS = 8  # to the best state, before energy descent takes over
 _FLOOR_FACTOR = 30.0
-_BENT_TOO_FAR = 2.5  # rad from one end of an element to the other; at pi its strain measure ends
 _MECHANISM = (
     "a neutral equilibrium (a mechanism, or a bifurcation point): a motion meets no resistance, "
     "the softest mode's eigenvalue {:.1e} is zero to rounding"
@@ -41,36 +41,6 @@ _MECHANISM = (
 # Shifted steps in a row, and the relative residual, after which an iteration is taken to be
 # creeping up to a saddle.
 _LINGERING, _NEAR = 20, 1e-2
-
-
-@dataclass(frozen=True)
-class NewtonOptions:
-    """Settings of the equilibrium solver.
-
-    tolerance : largest residual force, relative to the largest internal force (round-off is allowed
-        for)
-    max_iterations : over all phases of one solve
-    rotation_cap : rad, largest rotation or hinge turn of one step
-    mixed : predicted-stress iteration; False gives plain Newton with line search
-    patience : mixed iterations without headway before the best state returns and steps become
-        shorter
-    escapes : how many saddles are left before the solve is given up
-    escape_rotation : rad, largest rotation of the first move away from a saddle
-    soften : when a start without stress (one that no earlier solve led to) brings nothing, solve
-        with rods that are soft along their axis first (see softened.py)
-    side : (n_free,) vector; where the two ways off a saddle are equivalent, the one with positive
-        product is taken
-    """
-
-    tolerance: float = 1e-9
-    max_iterations: int = 300
-    rotation_cap: float = 0.4
-    mixed: bool = True
-    patience: int = 8
-    escapes: int = 6
-    escape_rotation: float = 0.05
-    soften: bool = True
-    side: np.ndarray | None = None
 
 
 def solve(
@@ -139,26 +109,8 @@ class _Best:
     slope: float = 0.0
 
 
-class _Run:
-    """One solve: the iterate and the safeguards' memory."""
-
-    def __init__(
-        self,
-        system: System,
-        q: np.ndarray,
-        start: Start,
-        opening: float | None,
-        options: NewtonOptions,
-    ):
-        self.system, self.q, self.opening, self.options = system, q, opening, options
-        self.state = system.scene.held(start.state, q)
-        self.torque = start.torque
-        system.predicted_stress[:] = 0.0 if start.stress is None else start.stress
-        self.iterations = 0
-        self.escapes = 0
-        self.shift = 0.0
-        # if the Hessian of the state itself is in the system already
-        self.assembled: Energy | None = None
+class _Run(Iterate):
+    """One solve: phases of iterations, and ways off saddles."""
 
     def solve(self) -> Equilibrium:
         begin = perf_counter()
@@ -168,14 +120,14 @@ class _Run:
         while True:
             while not converged:
                 self.assembled = None
-                self._check_budget()
+                self.check_budget()
                 converged = self._descend(self.options.patience)
                 if not converged and self.options.mixed:
                     self.system.predicted_stress[:] = self.system.stress()
                     converged = self._mixed()
             energy = self.assembled or self.system.assemble(self.state)
             residual, gap = self.residual()
-            if not self._converged(residual, gap):
+            if not self.converged(residual, gap):
                 # accepted at a trial state's larger forces
                 converged = False
                 continue
@@ -227,9 +179,9 @@ class _Run:
         while True:
             energy = system.assemble(self.state, mixed=True)
             residual, gap = self.residual()
-            merit, value = self._merit(residual, gap), energy.potential + self.torque * gap
+            merit, value = self.merit(residual, gap), energy.potential + self.torque * gap
             if merit <= 1.0:
-                self.assembled = energy if self._predicted() else None
+                self.assembled = energy if self.predicted() else None
                 return True
             if np.isfinite(value) and (best is None or self._headway(best, value, merit)):
                 if since <= _QUICK:
@@ -250,7 +202,7 @@ class _Run:
                         return False
                     cap, floor = cap / 3, max(_FLOOR_FACTOR * floor, 1e-3 * shift_unit(system))
                     continue
-            self._check_budget()
+            self.check_budget()
             self.shift, border = factorise_convex(system, max(floor, self.shift / 16))
             shifted = shifted + 1 if self.shift > floor else 0
             if shifted > _LINGERING and self.relative(residual) < _NEAR:
@@ -262,7 +214,7 @@ class _Run:
                 # the look at the stability has factorised the unshifted matrix
                 self.shift, border = factorise_convex(system, self.shift)
             step, change = bordered_solve(system, border, -residual, -gap)
-            scale = self._capped(step, cap)
+            scale = self.capped(step, cap)
             # without a potential nothing tells whether a shortened step leads ahead: a roll-up
             # needs many of them
             counted = scale == 1.0 or system.conservative
@@ -286,7 +238,7 @@ class _Run:
         """Newton on the energy with shift and Armijo line search; at most `limit` accepted
         steps."""
         system = self.system
-        self._close_gap()
+        self.close_gap()
         energy = system.assemble(self.state)
         shift = 0.0
         for _ in range(limit):
@@ -299,16 +251,16 @@ class _Run:
                     -float(system.gradient[: system.n_unknowns] @ border.column) / border.schur
                 )
                 residual, gap = self.residual()
-            if self._converged(residual, gap):
+            if self.converged(residual, gap):
                 return True
-            self._check_budget()
+            self.check_budget()
             step, _ = bordered_solve(system, border, -residual, -gap)
             scale = self._line_search(
-                step, self._capped(step, self.options.rotation_cap), float(residual @ step), energy
+                step, self.capped(step, self.options.rotation_cap), float(residual @ step), energy
             )
             if scale == 0.0:
                 if shift == 0.0:
-                    return self._merit(residual, gap) < 1.0
+                    return self.merit(residual, gap) < 1.0
                 shift *= 8
                 if shift > 1e12 * float(np.median(np.abs(system.values[system.sparsity.diagonal]))):
                     return False
@@ -316,7 +268,7 @@ class _Run:
             self.state = self.state.moved(system.increment(scale * step))
             shift = 0.0 if scale >= 0.5 else shift
             energy = system.assemble(self.state)
-        return self._converged(*self.residual())
+        return self.converged(*self.residual())
 
     def _line_search(self, step: np.ndarray, scale: float, slope: float, energy: Energy) -> float:
         """Backtracking on the potential (on the residual where no potential exists); 0 when nothing
@@ -392,80 +344,6 @@ class _Run:
                 scale /= 8
         return best, change
 
-    # -- measures ------------------------------------------------------------------------------
-    def residual(self) -> tuple[np.ndarray, float]:
-        """Residual (n_free,) of the state assembled last, and how far its mean angle is from the
-        opening."""
-        system = self.system
-        residual = system.gradient[: system.n_unknowns]
-        if system.constraint is None:
-            return residual, 0.0
-        return residual + self.torque * system.constraint, self._gap()
-
-    def _gap(self) -> float:
-        return float(self.state.angles[self.system.scene.actuated].mean() - self.opening)
-
-    def _largest(self, residual: np.ndarray) -> float:
-        """Largest residual force, moments divided by the length scale."""
-        return float(np.max(np.abs(residual) * self.system.force_weight, initial=0.0))
-
-    def _merit(self, residual: np.ndarray, gap: float) -> float:
-        """Residual over its tolerance; converged at 1."""
-        force, noise = self.system.force_scale()
-        allowed = self.options.tolerance * force + 40 * noise
-        return max(self._largest(residual) / allowed, abs(gap) / 1e-11)
-
-    def _predicted(self) -> bool:
-        """Whether the stress that the mixed Hessian was taken at is the state's own, as exact as
-        its residual is."""
-        force, noise = self.system.force_scale()
-        error = np.abs(self.system.predicted_stress - self.system.stress())
-        error[:, 3:] /= self.system.scene.length_scale
-        return bool(error.max(initial=0.0) <= self.options.tolerance * force + 40 * noise)
-
-    def relative(self, residual: np.ndarray) -> float:
-        force, noise = self.system.force_scale()
-        return self._largest(residual) / max(force, noise, np.finfo(float).tiny)
-
-    def _converged(self, residual: np.ndarray, gap: float) -> bool:
-        return self._merit(residual, gap) <= 1.0
-
-    def _capped(self, step: np.ndarray, cap: float) -> float:
-        """Share of a step that turns nothing by more than a cap, rad."""
-        turn = np.abs(step.take(self.system.rotations)).max(initial=0.0)
-        return min(1.0, cap / max(turn, np.finfo(float).tiny))
-
-    def _close_gap(self) -> None:
-        """Spread what the mean angle lacks over all actuated hinges: descent keeps the equation
-        satisfied."""
-        if self.system.constraint is None:
-            return
-        angles = self.state.angles.copy()
-        angles[self.system.scene.actuated] -= self._gap()
-        self.state = State(self.state.positions, self.state.rotations, angles)
-
-    def _check_budget(self) -> None:
-        if self.iterations >= self.options.max_iterations:
-            raise SimulationFailure(
-                f"no equilibrium within {self.options.max_iterations} Newton iterations"
-                f"{self._bent_too_far()}"
-            )
-        self.iterations += 1
-
-    def _bent_too_far(self) -> str:
-        """A hint where an element bends or twists so far that its strain is about to be undefined,
-        else nothing."""
-        system = self.system
-        turns = np.linalg.norm(
-            system.strain[:, 3:] + system.lengths[:, None] * system.scene.rest_strain[:, 3:], axis=1
-        )
-        worst = int(np.argmax(turns))
-        return (
-            f": element {worst} turns by {turns[worst]:.2f} rad, divide its rod more finely"
-            if (turns[worst] > _BENT_TOO_FAR)
-            else ""
-        )
-
 
 def refine(system: System, equilibrium: Equilibrium, steps: int = 3) -> Equilibrium:
     """The same equilibrium converged to round-off: plain Newton steps as long as they lower the
@@ -474,7 +352,7 @@ def refine(system: System, equilibrium: Equilibrium, steps: int = 3) -> Equilibr
     For states that are kept: Exudyn's Jacobian leaves part of the joints' stiffness out, so that
     near a bifurcation it contracts slowly, and what it starts with is what it ends with.
     """
-    run = _Run(system, equilibrium.q, equilibrium.start, equilibrium.opening, NewtonOptions())
+    run = Iterate(system, equilibrium.q, equilibrium.start, equilibrium.opening, NewtonOptions())
     system.set_parameters(equilibrium.q)
     energy = system.assemble(run.state)
     residual, gap = run.residual()
