@@ -15,6 +15,7 @@ from dataclasses import replace
 
 from .assigned import further_rounds
 from .events import SQPLabel
+from .forgiving import made_otherwise
 from .objective import Evaluation
 from .stage_results import StageResult, all_same
 from .stages import Stages
@@ -51,23 +52,34 @@ def level(stages: Stages, result: StageResult, numbers: Iterator[int]) -> StageR
         last = further_rounds(careful, end, numbers, SQPLabel.of_levelling, ends)
         ends.append(last)
         steps = result.steps + last.steps
-    proving = stages.proving()
     for trial in sorted(ends, key=lambda one: worst(one.designs))[:_LOOKED_AT]:
-        found = secured.weighed(trial)
-        if found.value is None or not _better(stages, found, result):
-            continue
-        snapping = proving.snapping(found)
-        if not set(snapping) <= set(result.snapping):
-            continue
-        log.info(
-            "largest deviation %.3g %%, from %.3g %%, at J = %.5g, from %.5g",
-            worst(found.designs),
-            worst(result.designs),
-            found.value,
-            result.value,
-        )
-        return replace(found, steps=steps, jumps=result.jumps, snapping=snapping)
+        found = _proved(stages, secured.weighed(trial), result)
+        if found is not None:
+            log.info(
+                "largest deviation %.3g %%, from %.3g %%, at J = %.5g, from %.5g",
+                worst(found.designs),
+                worst(result.designs),
+                found.value,
+                result.value,
+            )
+            return replace(found, steps=steps, jumps=result.jumps)
     return replace(result, steps=steps)
+
+
+def _proved(stages: Stages, found: StageResult, before: StageResult) -> StageResult | None:
+    """A result that is better than before and makes no other designs snap, in more sets of errors
+    than steps are tried with; designs that do are made of the same parts otherwise. None where that
+    doesn't help."""
+    if found.value is None or not _better(stages, found, before):
+        return None
+    proving = stages.proving()
+    snapping = proving.snapping(found)
+    if lost := sorted(set(snapping) - set(before.snapping)):
+        found, still = made_otherwise(proving, found, lost)
+        if still or not _better(stages, found, before):
+            return None
+        snapping = tuple(n for n in snapping if n not in lost)
+    return replace(found, snapping=snapping)
 
 
 def worst(designs: Sequence[object]) -> float:

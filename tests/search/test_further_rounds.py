@@ -156,6 +156,17 @@ def test_levelled_results_are_proved_with_more_errors(found, monkeypatch):
     unproved = level(stages, after, count(1))
     assert proving.required.seed in asked
     assert worst(unproved.designs) == worst(after.designs) and unproved.snapping == ()
+    # where a design can be made of the same parts otherwise, that is taken
+    mended = []
+
+    def otherwise(stages, result, lost):
+        mended.append(list(lost))
+        return result, ()
+
+    monkeypatch.setattr(levelling, "made_otherwise", otherwise)
+    won = level(stages, after, count(1))
+    assert mended == [[0]] and won.snapping == ()
+    assert worst(won.designs) == worst(better.designs)
 
 
 def test_a_kit_that_snaps_in_more_sets_is_made_otherwise_or_says_so(found, monkeypatch):
