@@ -282,12 +282,6 @@ def run(args: argparse.Namespace) -> int:
                 field=f"--{option}",
             )
     if wanted in (None, "umbrella"):
-        if args.unit not in (None, "mm"):
-            raise InputError(
-                "umbrella meshes are in mm; --scale 1000 makes mm of metres",
-                field="--unit",
-                value=args.unit,
-            )
         if len(args.elastic_limit or ()) > len(_MATERIALS):
             raise InputError(
                 "expected one limit, or those of arms and plates", field="--elastic-limit"
@@ -548,13 +542,19 @@ def _undrawn_data(args: argparse.Namespace) -> dict[str, Any]:
     from ..files.json_files import is_json_file, json_stem, read_json
     from ..structures.base import foreign_format, format_names
 
+    data = read_json(args.file) if args.patch is None and is_json_file(args.file) else None
+    if data is not None and is_own(data):  # of any class, in any unit
+        return _converted(args, data)
+    if args.unit not in (None, "mm"):
+        raise InputError(
+            "umbrella meshes are in mm; --scale 1000 makes mm of metres",
+            field="--unit",
+            value=args.unit,
+        )
     if args.patch is not None:
         return _umbrella_on_mesh(args)
-    if not is_json_file(args.file):
+    if data is None:
         raise InputError("an umbrella mesh on a surface needs --patch", source=args.file)
-    data = read_json(args.file)
-    if is_own(data):
-        return _converted(args, data)
     foreign = foreign_format(data)
     if foreign is None or foreign.rewrite is None:
         raise InputError(
