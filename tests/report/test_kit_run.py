@@ -22,7 +22,9 @@ from kop_exudyn.report.part_drawings import part_drawings
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
 
-SETTINGS = JobSettings(jobs=1, stages=StageSettings(schedule=(1e3, 1e5), path_steps=4))
+SETTINGS = JobSettings(
+    jobs=1, stages=StageSettings(schedule=(1e3, 1e5), path_steps=4, effort="quick")
+)
 
 
 @pytest.fixture(scope="module")
