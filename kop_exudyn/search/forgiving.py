@@ -97,7 +97,8 @@ def forgiving_stage(
 
 def proven(stages: Stages, result: StageResult) -> StageResult:
     """A result that forgives, tried with more sets of errors; designs that snap in one of them are
-    made of the same parts otherwise, where that helps."""
+    made of the same parts otherwise, where that helps and costs little: what is one set in many to
+    the workshop isn't worth a shape that is far off."""
     if result.value is None or result.snapping:
         return result
     proving = stages.proving()
@@ -106,8 +107,8 @@ def proven(stages: Stages, result: StageResult) -> StageResult:
         return result
     names = [stages.dataset.designs[n].name for n in lost]
     log.info("in more sets of errors %s snap", ", ".join(names))
-    mended, still = made_otherwise(proving, result, lost)
-    return replace(mended, snapping=still)
+    near = 1 + (_NEAR - 1) / len(result.designs)
+    return made_otherwise(proving, result, lost, near)[0]
 
 
 def substitute(
@@ -127,7 +128,7 @@ def substitute(
 
 
 def made_otherwise(
-    stages: Stages, result: StageResult, lost: Sequence[int]
+    stages: Stages, result: StageResult, lost: Sequence[int], near: float = _NEAR
 ) -> tuple[StageResult, tuple[int, ...]]:
     """The result with other parts, of the same kit, for the elements of designs that snap; and the
     designs that still do.
@@ -136,12 +137,12 @@ def made_otherwise(
     get any other parts, and then all those that the model prefers: another local minimum, of which
     there are many. Each is opened and tried with errors.
 
-    lost : the designs that snap
+    lost : the designs that snap; near : times J, above which nothing is a substitute
     """
     still = tuple(lost)
     if stages.rule.stock is not None or len(stages.dataset.sliding):
         return result, still
-    dataset, limit = stages.dataset, _NEAR * value_of(result)
+    dataset, limit = stages.dataset, near * value_of(result)
     derivatives = dataset.derivatives(result.evaluations, hessian=True)
     scales = dataset.split(dataset.scales())
     model = LocalModel.of(derivatives, dataset.design_weights, scales, _DAMPING)
