@@ -76,7 +76,7 @@ def drawn(rows: list[dict]) -> Figure:
                 axis.plot(
                     np.arange(1, len(ratios) + 1), ratios, "o-", color=PALETTE[colour], label=effort
                 )
-        axis.set(xlabel="instances", ylabel="J over the optimum's", yscale="log")
+        axis.set(xlabel="instances", ylabel="J over the optimum's")
         axis.legend()
     return figure
 
