@@ -85,7 +85,7 @@ class TestObj:
         "text, message",
         [
             ("v 0 0 0\nf 1 1 1\n", "net.obj: contains no curves"),
-            ("v 0 0\n", "line 1 = '0 0': expected three coordinates"),
+            ("v 0\n", "line 1 = '0': expected"),
             (
                 "v 0 0 1e99\n",
                 "line 1 = '0 0 1e99': expected three coordinates of a vertex, within 1e60",

@@ -31,10 +31,15 @@ def data_of(reports: Path, name: str) -> dict[str, Any]:
     return json.loads((reports / name / "data.json").read_text(encoding="utf-8"))
 
 
+def words_of(page: Path) -> str:
+    """A page with the characters and the spaces that are meant: numbers keep to their units."""
+    return unescape(page.read_text(encoding="utf-8")).replace("\xa0", " ")
+
+
 def found(name: str, reports: Path) -> dict[str, Any]:
     """Run a study, look whether its page says what its data say, and give these."""
-    page = (run(name, reports) / "index.html").read_text(encoding="utf-8")
+    page = words_of(run(name, reports) / "index.html")
     data = data_of(reports, name)
-    assert data["quick"] and data["finding"] in unescape(page)
+    assert data["quick"] and data["finding"] in page
     assert page.count("<img") >= 1
     return data
