@@ -30,11 +30,13 @@ class Stop:
     cause : "not found", "opening", "stress", "tolerance", "load" or "fabrication"
     why : in words, without the design's name
     helps : what would mend it, in words; None where nothing is known
+    case : name of the load case that it is about; None for other causes
     """
 
     cause: str
     why: str
     helps: str | None
+    case: str | None = None
 
     def to_dict(self) -> dict[str, str | None]:
         return {"cause": self.cause, "why": self.why, "helps": self.helps}
@@ -143,7 +145,8 @@ def about_loads(
             continue
         why = " and ".join(_failing(design, check, safety))
         helps = _carrying(design, deployed, check, safety)
-        found.append(Stop("load", f"under {check.case.name} it {why}", helps))
+        name = check.case.name
+        found.append(Stop("load", f"under {name} it {why}", helps, name))
     return found
 
 

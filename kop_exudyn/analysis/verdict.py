@@ -232,7 +232,7 @@ def judge(
             held = supports_of(design, inputs[design.fitted_role.name], case)
             checks.append(check_load(design, deployed, replace(case, supports=held)))
         except InputError as error:
-            stops.append(Stop("load", f"{case.name}: {error}", None))
+            stops.append(Stop("load", f"{case.name}: {error}", None, case.name))
     stops += about_loads(design, deployed, checks, settings.safety)
     role = design.fitted_role.name
     as_given = _softness(design.scene(role), inputs[role])

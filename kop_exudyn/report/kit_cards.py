@@ -142,15 +142,9 @@ def _lines(
         )
     if verdict is not None:
         lines += _opening(verdict)
-        lines += [_load(check, result.units, _fails(check, verdict)) for check in verdict.loads]
+        failing = {stop.case for stop in verdict.stops}
+        lines += [_load(check, result.units, check.case.name in failing) for check in verdict.loads]
     return lines
-
-
-def _fails(check: LoadCheck, verdict: Buildable) -> bool:
-    """Whether a load case is one of those that stop a design."""
-    return any(
-        s.cause == "load" and s.why.startswith(f"under {check.case.name} ") for s in verdict.stops
-    )
 
 
 def _load(check: LoadCheck, units: Units | None, bad: bool) -> tuple[str, str, bool]:

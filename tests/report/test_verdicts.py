@@ -87,7 +87,8 @@ def test_a_load_that_no_kit_carries(study, capsys):
     """What the command prints is what the result says and how the page begins."""
     push = {"joint": 5, "force": [0, 0, -20.0]}
     case = {"name": "a sack of sand", "points": [push], "deflection": {"span_over": 300}}
-    file = study(load_cases=[case])
+    light = {"name": "a sack", "points": [{"joint": 5, "force": [0, 0, -0.02]}]}
+    file = study(load_cases=[case, light])
     out = file.parent / "out"
     assert main(["optimize", str(file), "--out", str(out), "--jobs", "1", "-q"]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -109,6 +110,7 @@ def test_a_load_that_no_kit_carries(study, capsys):
     assert words.startswith(" ".join(lines[:2])) and "Can they be built?" in words
     # the design's card has the load that stops it, in the colour of what is wrong
     assert re.search(r"<dd class=bad>a sack of sand: deflects [\d.]+\xa0mm", page)
+    assert re.search(r"<dd>a sack: deflects [\d.]+\xa0mm", page)  # which is carried
     assert "stress under it" in words
 
 
