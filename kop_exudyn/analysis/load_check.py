@@ -77,9 +77,9 @@ class LoadCheck:
     @property
     def stiff(self) -> bool:
         """Whether the deflection keeps to its limit."""
-        if self.allowed == np.inf:
-            return self.stable or not np.isnan(self.deflection)
-        return not np.isnan(self.deflection) and not beyond_limit(self.deflection, self.allowed)
+        if np.isnan(self.deflection):
+            return self.allowed == np.inf and self.stable
+        return not beyond_limit(self.deflection, self.allowed)
 
     def carried(self, safety: float = 1.0) -> bool:
         """Whether deflection, stress and stability are within their limits.

@@ -103,24 +103,20 @@ def _without_doubles(
         heights = _distances(points, curves[other])
         if heights.max() <= tolerance:
             gone[k] = other
-    found = [
-        Finding(
-            "cleaned",
-            f"{curves[k].label} lies on {curves[other].label} and is left out",
-            _middle(curves[k])[None],
-        )
+    told = [
+        (f"{curves[k].label} lies on {curves[other].label}", _middle(curves[k]))
         for k, other in sorted(gone.items())
     ]
-    if len(found) > _TOLD:
-        text = f"{len(found)} curves lie on others and are left out: {found[0].text[:-16]}, say"
-        found = [Finding("cleaned", text, np.concatenate([f.places for f in found]))]
+    found = [Finding("cleaned", f"{text} and is left out", at[None]) for text, at in told]
+    if len(told) > _TOLD:
+        text = f"{len(told)} curves lie on others and are left out: {told[0][0]}, say"
+        found = [Finding("cleaned", text, np.array([at for _, at in told]))]
     return [curve for k, curve in enumerate(curves) if k not in gone], found
 
 
 def _outline(curve: DrawnCurve) -> np.ndarray:
     """Its points in plan; a loop's first one again at the end."""
-    points = np.concatenate([curve.points, curve.points[:1]]) if curve.closed else curve.points
-    return points[:, :2]
+    return curve.path[:, :2]
 
 
 def _middle(curve: DrawnCurve) -> np.ndarray:
@@ -131,14 +127,14 @@ def _middle(curve: DrawnCurve) -> np.ndarray:
 
 def _densely(curve: DrawnCurve, step: float) -> np.ndarray:
     """Points on the curve: its corners, and a few between each two."""
-    points = np.concatenate([curve.points, curve.points[:1]]) if curve.closed else curve.points
+    points = curve.path
     shares = np.linspace(0, 1, 4, endpoint=False)[:, None, None]
     return ((1 - shares) * points[:-1] + shares * points[1:]).reshape(-1, 3)
 
 
 def _distances(points: np.ndarray, curve: DrawnCurve) -> np.ndarray:
     """(n,) distances in space of points (n, 3) from a curve's pieces."""
-    nodes = np.concatenate([curve.points, curve.points[:1]]) if curve.closed else curve.points
+    nodes = curve.path
     start, along = nodes[:-1], np.diff(nodes, axis=0)
     share = np.einsum("nmk,mk->nm", points[:, None] - start, along) / np.sum(along**2, axis=1)
     nearest = start + np.clip(share, 0, 1)[:, :, None] * along

@@ -10,9 +10,19 @@ import shapely
 
 from ..geometry.crossings import near_crossings
 from ..geometry.curves import Curve
-from .drawing import DrawnCurve
+from .drawing import DrawnCurve, path_of
 
 _LEVEL = 1e-3  # of the size: curves farther apart in height pass each other
+
+
+def plan_lines(
+    curves: Sequence[DrawnCurve], flat: Sequence[np.ndarray]
+) -> list[shapely.LineString]:
+    """The curves as lines in plan.
+
+    flat : their points (n, 2) there
+    """
+    return [shapely.LineString(path_of(x, curve.closed)) for curve, x in zip(curves, flat)]
 
 
 def crossing_pieces(
@@ -23,10 +33,7 @@ def crossing_pieces(
     flat : the curves' points (n, 2) in plan; heights are taken from the curves
     tolerance, size : lengths
     """
-    lines = [
-        shapely.LineString(np.concatenate([x, x[:1]]) if curve.closed else x)
-        for curve, x in zip(curves, flat)
-    ]
+    lines = plan_lines(curves, flat)
     if len(lines) < 2:
         return []
     i, j = shapely.STRtree(lines).query(lines, predicate="dwithin", distance=tolerance)

@@ -56,10 +56,15 @@ def _sharp(curve: DrawnCurve) -> np.ndarray:
         x = np.concatenate([x[-1:], x, x[:1]])
     if len(x) < 3:
         return np.empty(0, int)
-    steps = np.diff(x, axis=0)
-    u = steps / np.linalg.norm(steps, axis=1)[:, None]
-    turns = np.arccos(np.clip((u[:-1] * u[1:]).sum(axis=1), -1, 1))
+    turns = np.arccos(np.clip(cosines_of_turns(x), -1, 1))
     return np.flatnonzero(turns > _SHARP + 1e-6) + (0 if curve.closed else 1)
+
+
+def cosines_of_turns(points: np.ndarray) -> np.ndarray:
+    """(n - 2,) cosines of the angles by which a polyline (n, d) turns at its inner points."""
+    steps = np.diff(points, axis=0)
+    steps = steps / np.linalg.norm(steps, axis=1)[:, None]
+    return (steps[:-1] * steps[1:]).sum(axis=1)
 
 
 def rounded_corners(curves: Sequence[DrawnCurve]) -> list[Finding]:
@@ -85,7 +90,7 @@ def _departure(curve: DrawnCurve) -> tuple[float, float, np.ndarray]:
     piece (the largest of each), and where that is."""
     from scipy.interpolate import CubicSpline
 
-    points = np.concatenate([curve.points, curve.points[:1]]) if curve.closed else curve.points
+    points = curve.path
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if len(points) < 3 or not steps.all():
         return 0.0, 0.0, points[0]

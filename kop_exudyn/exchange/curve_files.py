@@ -19,8 +19,8 @@ from .dxf_curves import dxf_drawing
 from .other_formats import is_really
 from .rhino_curves import rhino_drawing
 
-_SIZE_LIMIT = 64 * 2**20  # bytes: nets have some thousand points
-_MOST_CURVES = 20_000
+SIZE_LIMIT = 64 * 2**20  # bytes: nets have some thousand points
+MOST_CURVES = 20_000
 _HEAD = 4096  # bytes of an OBJ file in which its unit may be said
 _UNIT_COMMENT = re.compile(r"\s*#\s*(?:file\s+)?units?\s*[:=]\s*([a-z]+)", re.IGNORECASE)
 _UNIT_WORDS = {
@@ -57,7 +57,7 @@ def read_drawing(path: str | Path, layers: Sequence[str] = ()) -> Drawing:
         raise InputError(
             "only DXF and 3dm files have layers", source=path, field="layer", value=layers[0]
         )
-    content = read_bytes(path, _SIZE_LIMIT)
+    content = read_bytes(path, SIZE_LIMIT)
     other = is_really(content)
     if other is not None:
         raise InputError(other, source=path)
@@ -69,9 +69,9 @@ def read_drawing(path: str | Path, layers: Sequence[str] = ()) -> Drawing:
         said = [*drawing.skipped, *drawing.doubts]
         skipped = f" ({'; '.join(said)})" if said else ""
         raise InputError(f"contains no curves{skipped}", source=path)
-    if len(drawing.curves) > _MOST_CURVES:
+    if len(drawing.curves) > MOST_CURVES:
         raise InputError(
-            f"contains {len(drawing.curves):,} curves, at most {_MOST_CURVES:,} are read",
+            f"contains {len(drawing.curves):,} curves, at most {MOST_CURVES:,} are read",
             source=path,
         )
     return drawing
@@ -83,7 +83,7 @@ def is_surface(path: str | Path) -> bool:
     if not str(path).lower().endswith(".obj"):
         return False
     try:
-        content = parse_obj(read_bytes(path, _SIZE_LIMIT))
+        content = parse_obj(read_bytes(path, SIZE_LIMIT))
     except InputError as error:
         raise error.at(path) from None
     return bool(content.faces) and not content.lines and not content.curves

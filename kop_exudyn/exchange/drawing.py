@@ -26,6 +26,16 @@ class DrawnCurve:
     label: str
     layer: str | None = None
 
+    @property
+    def path(self) -> np.ndarray:
+        """The points, the first one once more at the end of a closed curve."""
+        return path_of(self.points, self.closed)
+
+
+def path_of(points: np.ndarray, closed: bool) -> np.ndarray:
+    """Points (n, d) of a curve, those of a closed one back to the first."""
+    return np.concatenate([points, points[:1]]) if closed else points
+
 
 @dataclass(frozen=True)
 class Drawing:
@@ -52,11 +62,15 @@ class Finding:
     kind : "skipped", "cleaned", "joined", "hinged" or "suspicious"
     text : a sentence without its end
     places (k, 3) : where, in the drawing
+    cause : a name for it, where what comes of it later is explained by it
+    labels : of the curves that it is about, where there is a cause
     """
 
     kind: str
     text: str
     places: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
+    cause: str | None = None
+    labels: tuple[str, ...] = ()
 
 
 def size_of(curves: Sequence[DrawnCurve]) -> float:

@@ -23,6 +23,7 @@ from .curve_files import read_drawing
 from .drawing import Drawing, DrawnCurve, Finding, size_of
 from .frames import Frame, frame_of
 from .joins import join_ends
+from .outlines import place_of
 from .overlaps import without_overlaps
 from .parts import advice, largest_part
 from .strips import axes_of_strips, sides_of_laths
@@ -39,7 +40,8 @@ _DIGITS = 9  # of the size, that points are written with
 _SUSPICIOUS = (
     20.0  # times the tolerance: ends that stop so near to another curve may be meant on it
 )
-_CROWDED = "a joint holds two laths, of which at most four ends meet"
+# Causes of what is wrong with a network.
+_CROWDED, _SHORT = "crowded", "short"
 _IN_SPACE = (
     "the net is drawn in space and read as a height field, seen along {}: where it hangs over, "
     "turn it, or give its --surface with --chart conformal"
@@ -142,18 +144,12 @@ class DrawnNetwork:
 
     def _crowded(self) -> str | None:
         """What was said of places where too many curves end."""
-        return next((f.text for f in self.findings if f.text.endswith(_CROWDED)), None)
+        return next((f.text for f in self.findings if f.cause == _CROWDED), None)
 
     def _short_of(self, label: str | None) -> str | None:
         """What was said of a curve that stops a little short of others, or the other way round."""
-        return next(
-            (
-                f.text
-                for f in self.findings
-                if f.text.startswith(f"{label} ends ") or f" short of {label}: " in f.text
-            ),
-            None,
-        )
+        found = (f.text for f in self.findings if f.cause == _SHORT and label in f.labels)
+        return next(found, None)
 
     def _advice(self, error: InputError) -> str | None:
         """What to do where the drawing falls into parts, or is in space."""
@@ -272,12 +268,12 @@ def _about_joins(joined: Any) -> list[Finding]:
         )
         found.append(Finding("suspicious", text, joined.by_turn))
     if len(joined.crowded):
-        x, y, z = joined.crowded[0]
         text = (
             f"more than four ends of curves meet at {len(joined.crowded)} places, such as "
-            f"({x:.6g}, {y:.6g}, {z:.6g}): {_CROWDED}"
+            f"{place_of(joined.crowded[0])}: a joint holds two laths, of which at most four ends "
+            "meet"
         )
-        found.append(Finding("suspicious", text, joined.crowded))
+        found.append(Finding("suspicious", text, joined.crowded, _CROWDED))
     if not joined.families:
         text = (
             "the curves don't fall into two families that cross only each other: they brace each "
@@ -333,15 +329,16 @@ def _missed(curves: Sequence[DrawnCurve], near: Sequence[EndContact]) -> list[Fi
             for o in others_end
         ):
             told.append(contact)
-    return [
-        Finding(
-            "suspicious",
-            f"{curves[contact.curve].label} ends {-contact.beyond:.3g} short of "
-            f"{curves[contact.other].label}: a joint may be meant (--tolerance)",
-            curves[contact.curve].points[contact.end][None],
+    found = []
+    for contact in told:
+        labels = (curves[contact.curve].label, curves[contact.other].label)
+        text = (
+            f"{labels[0]} ends {-contact.beyond:.3g} short of {labels[1]}: a joint may be meant "
+            "(--tolerance)"
         )
-        for contact in told
-    ]
+        place = curves[contact.curve].points[contact.end][None]
+        found.append(Finding("suspicious", text, place, _SHORT, labels))
+    return found
 
 
 def network_summary(found: CurveNetwork) -> Mapping[str, Any]:

@@ -15,13 +15,11 @@ from ..errors import InputError
 from ..files.files import read_bytes
 from ..geometry.obj_files import parse_obj
 from ..units import LENGTHS
-from .curve_files import said_unit
+from .curve_files import MOST_CURVES, SIZE_LIMIT, said_unit
 from .drawing import Drawing, DrawnCurve
+from .outlines import place_of
 
 EDGE_SUFFIXES = (".obj", ".json")
-_SIZE_LIMIT = 64 * 2**20  # bytes
-_MOST_EDGES = 20_000
-
 Edges = tuple[np.ndarray, list[tuple[int, int]]]
 
 
@@ -39,28 +37,26 @@ def edges_of(path: Path) -> Drawing:
             source=path,
             field="--edges",
         )
-    content = read_bytes(path, _SIZE_LIMIT)
+    content = read_bytes(path, SIZE_LIMIT)
     try:
         points, pairs = _of_obj(content) if suffix == ".obj" else _of_compas(content)
     except InputError as error:
         raise error.at(path) from None
     if not pairs:
         raise InputError("contains no faces, nor a graph, whose edges are laths", source=path)
-    if len(pairs) > _MOST_EDGES:
+    if len(pairs) > MOST_CURVES:
         raise InputError(
-            f"has {len(pairs):,} edges, at most {_MOST_EDGES:,} are read as laths", source=path
+            f"has {len(pairs):,} edges, at most {MOST_CURVES:,} are read as laths", source=path
         )
     curves = [
-        DrawnCurve(points[[a, b]], False, f"edge from ({_text(points[a])}) to ({_text(points[b])})")
+        DrawnCurve(
+            points[[a, b]], False, f"edge from {place_of(points[a])} to {place_of(points[b])}"
+        )
         for a, b in pairs
     ]
     unit = said_unit(content) if suffix == ".obj" else None
     kept = [curve for curve in curves if np.ptp(curve.points, axis=0).any()]
     return Drawing(kept, unit, None if unit is None else LENGTHS[unit])
-
-
-def _text(point: np.ndarray) -> str:
-    return ", ".join(f"{value:.6g}" for value in point)
 
 
 def _of_obj(content: bytes) -> Edges:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
+from .corners import cosines_of_turns
 from .drawing import DrawnCurve, Finding
 from .outlines import place_of
 
@@ -53,7 +54,7 @@ def without_overlaps(
 
 
 def _line(curve: DrawnCurve) -> shapely.LineString:
-    points = np.concatenate([curve.points, curve.points[:1]]) if curve.closed else curve.points
+    points = curve.path
     return shapely.LineString(points[:, :2])
 
 
@@ -64,8 +65,6 @@ def _raised(piece: shapely.LineString, z: float) -> np.ndarray:
 
 def _without_corners(points: np.ndarray) -> Iterator[np.ndarray]:
     """A polyline (n, 3) in parts that have no sharp corners."""
-    steps = np.diff(points[:, :2], axis=0)
-    steps = steps / np.linalg.norm(steps, axis=1)[:, None]
-    sharp = np.flatnonzero((steps[:-1] * steps[1:]).sum(axis=1) < _CORNER) + 1
+    sharp = np.flatnonzero(cosines_of_turns(points[:, :2]) < _CORNER) + 1
     for start, end in zip([0, *sharp], [*sharp, len(points) - 1]):
         yield points[start : end + 1]

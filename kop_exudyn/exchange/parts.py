@@ -10,6 +10,7 @@ import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from .contacts import plan_lines
 from .drawing import DrawnCurve, Finding
 
 _FEWEST = 4  # curves of what may be a net
@@ -24,10 +25,7 @@ def parts_of(
     flat : points (n, 2) of each in plan
     tolerance : a length, within which curves meet
     """
-    lines = [
-        shapely.LineString(np.concatenate([x, x[:1]]) if curve.closed else x)
-        for curve, x in zip(curves, flat)
-    ]
+    lines = plan_lines(curves, flat)
     pairs = shapely.STRtree(lines).query(lines, predicate="dwithin", distance=tolerance)
     graph = coo_array((np.ones(pairs.shape[1]), pairs), shape=(len(lines),) * 2)
     count, label = connected_components(graph, directed=False)

@@ -10,8 +10,9 @@ from scipy.interpolate import RBFInterpolator
 
 from ..errors import InputError
 from ..geometry.mesh_surface import MeshSurface
-from .drawing import Finding
+from .drawing import Finding, path_of
 from .drawn_networks import DrawnNetwork
+from .outlines import place_of
 
 _MARGIN = 0.08  # of the plan's size, by which the mesh goes beyond the net
 _MOST_POINTS = 700  # that the surface is put through: one dense system of equations
@@ -68,11 +69,10 @@ def with_heights_checked(drawn: DrawnNetwork) -> DrawnNetwork:
         ]
         apart.append(abs(heights[0] - heights[1]) * scale)
         if apart[-1] > _APART * net.size:
-            x, y = net.joints[joint]
             first, second = (drawn.labels[c] for c in pair)
             raise InputError(
                 f"passes {second} at a distance of {apart[-1]:.3g} where they cross in plan, at "
-                f"({x:.6g}, {y:.6g}): laths are hinged where they meet",
+                f"{place_of(net.joints[joint])}: laths are hinged where they meet",
                 field=first,
             )
     largest = max(apart)
@@ -128,9 +128,7 @@ def _in_parts(lengths: np.ndarray, n: int) -> np.ndarray:
 
 def _height_at(drawn: DrawnNetwork, curve: int, station: float) -> float:
     """Height of a drawn curve over the plan's arc length, by its polyline."""
-    local = drawn.frame(drawn.curves[curve].points)
-    if drawn.curves[curve].closed:
-        local = np.concatenate([local, local[:1]])
+    local = drawn.frame(drawn.curves[curve].path)
     steps = np.linalg.norm(np.diff(local[:, :2], axis=0), axis=1)
     stations = np.concatenate([[0.0], np.cumsum(steps)])
     share = station / drawn.network.strands[curve].curve.length
@@ -141,8 +139,7 @@ def _densely(points: np.ndarray, closed: bool) -> np.ndarray:
     """A curve's points and a few between each two, on the smooth curve through them."""
     from scipy.interpolate import CubicSpline
 
-    if closed:
-        points = np.concatenate([points, points[:1]])
+    points = path_of(points, closed)
     t = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     if len(points) < 3:
         return points[0] + np.linspace(0, 1, 20)[:, None] * (points[1] - points[0])

@@ -10,6 +10,7 @@ import shapely
 
 from ..errors import InputError
 from .drawing import DrawnCurve, Finding
+from .outlines import place_of
 from .strips import is_narrow
 
 # A loop around a place where two curves cross is a bolt's if it is nearly centred there, and so
@@ -119,7 +120,7 @@ def refuse_upright(
         if not (steps <= tolerance).any():
             continue
         k = int(steps.argmin())
-        a, b = (f"({', '.join(f'{x:.6g}' for x in curve.points[n])})" for n in (k, k + 1))
+        a, b = (place_of(curve.points[n]) for n in (k, k + 1))
         raise InputError(
             f"is seen as a point between {a} and {b}: nets in space are read as height fields, "
             "along the axis that they lie across most. Turn the drawing, or leave upright pieces "

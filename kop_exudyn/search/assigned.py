@@ -205,8 +205,10 @@ def _kept(stages: Stages, best: StageResult, trial: StageResult) -> StageResult 
     better than before.
     """
     kept = stages.kept(trial)
-    if kept.value is None or not stages.dataset.requirements.opening:
-        return None if kept.value is None else kept
+    if kept.value is None:
+        return None
+    if not stages.dataset.requirements.opening:
+        return kept
     lost = [
         n
         for n, (design, a, b) in enumerate(zip(stages.dataset.designs, kept.designs, trial.designs))
@@ -226,7 +228,7 @@ def _kept(stages: Stages, best: StageResult, trial: StageResult) -> StageResult 
         lost += stages.snapping_among(kept, changed)
     if not lost:
         return kept
-    if any(not np.array_equal(trial.kit[kind], best.kit[kind]) for kind in best.kit.sizes):
+    if not np.array_equal(trial.kit.vector, best.kit.vector):
         return None
     chosen = [best if n in lost else kept for n in range(len(best.designs))]
     found = stages.judged(combined(chosen, stages.dataset))

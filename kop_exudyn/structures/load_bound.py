@@ -135,8 +135,7 @@ class LoadBound:
         weights : (n, 3)
         """
         dofs = (6 * self._nodes[:, None] + np.arange(3)).ravel()
-        asked = next(one for one in self._steps if one.factor == factor)
-        both = Sensitivities(self._system(asked), loaded).adjoint(dofs, weights.ravel())
+        both = self._loaded_sensitivities(factor, loaded).adjoint(dofs, weights.ravel())
         nq = len(sensitivities.equilibrium.q)
         of_places = sensitivities.adjoint(self._moved, both[nq:])
         return both[:nq] + of_places - sensitivities.adjoint(dofs, weights.ravel())
@@ -145,10 +144,14 @@ class LoadBound:
         self, sensitivities: Sensitivities, factor: float, loaded: Equilibrium
     ) -> np.ndarray:
         """(n, 3, nq) derivatives of `moves` in the elements; parameters as of `moves_adjoint`."""
-        asked = next(one for one in self._steps if one.factor == factor)
-        own = Sensitivities(self._system(asked), loaded)
+        own = self._loaded_sensitivities(factor, loaded)
         places = sensitivities.rows(self._moved)
         return self._moves_derivatives(sensitivities, own, places, self._nodes)
+
+    def _loaded_sensitivities(self, factor: float, loaded: Equilibrium) -> Sensitivities:
+        """Of the state under a factor of the loads."""
+        asked = next(one for one in self._steps if one.factor == factor)
+        return Sensitivities(self._system(asked), loaded)
 
     def _moves_derivatives(
         self, sensitivities: Sensitivities, own: Sensitivities, places: np.ndarray, nodes: Indices
@@ -194,7 +197,7 @@ class LoadBound:
             if not near & set(self._names(asked)):
                 continue
             places = sensitivities.rows(self._moved)
-            own = Sensitivities(self._system(asked), loaded[asked.factor])
+            own = self._loaded_sensitivities(asked.factor, loaded[asked.factor])
             if asked.stress is not None and self._stress in near:
                 rows = asked.stress.rows(own)
                 found[self._stress] = Rows(rows.value, _chained(rows.jacobian, places))

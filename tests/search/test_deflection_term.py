@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.grids import coarse_grid
+from support.settings import FEW_STEPS
 
 from kop_exudyn.analysis.load_check import check_load
 from kop_exudyn.equilibrium.newton import NewtonOptions
 from kop_exudyn.errors import InputError
 from kop_exudyn.search.objective import DesignObjective, Weights
 from kop_exudyn.search.run import optimize_kit
-from kop_exudyn.search.settings import JobSettings, StageSettings
+from kop_exudyn.search.settings import JobSettings
 from kop_exudyn.structures import load_bound
 from kop_exudyn.structures.base import design_from_dict
 from kop_exudyn.structures.loading import loaded_state, supports_of
@@ -125,14 +126,7 @@ def test_its_weight_makes_kits_stiffer(repository):
             Weights(others=(("deflection", weight),)),
             jobs=1,
             baselines=False,
-            stages=StageSettings(
-                schedule=(1e4,),
-                reassignments=0,
-                relaxed_steps=6,
-                assigned_steps=10,
-                redeployments=0,
-                effort="quick",
-            ),
+            stages=FEW_STEPS,
         )
         outcome = optimize_kit(designs, {"linear": 4, "angular": 3}, settings=settings)
         found.append(

@@ -5,15 +5,14 @@ from itertools import count
 
 import numpy as np
 import pytest
+from support.shells import stages_of_two
 
 from kop_exudyn.errors import SimulationFailure
-from kop_exudyn.io.designs import load_design
 from kop_exudyn.search import assigned, forgiving, levelling, run
 from kop_exudyn.search.assigned import further_rounds
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.levelling import level, worst
-from kop_exudyn.search.objective import DesignObjective, Weights
-from kop_exudyn.search.pool import DesignPool
+from kop_exudyn.search.objective import DesignObjective
 from kop_exudyn.search.reassign import keep_parts
 from kop_exudyn.search.settings import StageSettings
 from kop_exudyn.search.stages import Stages
@@ -25,15 +24,8 @@ SETTINGS = StageSettings(assigned_steps=3, round_steps=6)
 def found(repository):
     """Secured stages of two small shells, a kit after a few steps, and further rounds from there
     with what steps they took."""
-    shells = [
-        load_design(repository / "models" / "small" / name)
-        for name in ("01_sinh.json", "06_moebius.json")
-    ]
     steps = []
-    with DesignPool(shells) as pool:
-        pool.prepare()
-        dataset = Dataset.of_pool(pool, Weights.suiting(shells))
-        stages = Stages(dataset, {"linear": 4, "angular": 2}, SETTINGS, observer=steps.append)
+    with stages_of_two(repository, SETTINGS, steps.append) as stages:
         secured = stages.secured(forgiving=True)
         start = secured.assigned(secured.kept(secured.direct()))
         steps.clear()

@@ -6,17 +6,14 @@ from itertools import count
 
 import numpy as np
 import pytest
+from support.shells import stages_of_two
 
 from kop_exudyn.errors import InputError
-from kop_exudyn.io.designs import load_design
 from kop_exudyn.search import levelling
-from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.events import SQPLabel
 from kop_exudyn.search.levelling import level, worst
 from kop_exudyn.search.objective import DesignObjective, Weights
-from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.settings import StageSettings
-from kop_exudyn.search.stages import Stages
 
 SETTINGS = StageSettings(assigned_steps=8)
 
@@ -25,15 +22,8 @@ SETTINGS = StageSettings(assigned_steps=8)
 def found(repository):
     """The stages of two small shells, a kit that opens and forgives, the steps that levelling it
     took, and what came of it."""
-    shells = [
-        load_design(repository / "models" / "small" / name)
-        for name in ("01_sinh.json", "06_moebius.json")
-    ]
     steps = []
-    with DesignPool(shells) as pool:
-        pool.prepare()
-        dataset = Dataset.of_pool(pool, Weights.suiting(shells))
-        stages = Stages(dataset, {"linear": 4, "angular": 2}, SETTINGS, observer=steps.append)
+    with stages_of_two(repository, SETTINGS, steps.append) as stages:
         before = stages.secured().assigned(stages.secured().kept(stages.direct()))
         assert not stages.snapping(before)
         steps.clear()

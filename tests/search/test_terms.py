@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.settings import FEW_STEPS
 
 from kop_exudyn.equilibrium.newton import NewtonOptions
 from kop_exudyn.errors import InputError
@@ -90,14 +91,7 @@ def test_more_weight_on_stress_lowers_it(repository):
             Weights(fit=1e4, energy=0.0, others=(("stress", weight),)),
             jobs=1,
             baselines=False,
-            stages=StageSettings(
-                schedule=(1e4,),
-                reassignments=0,
-                relaxed_steps=6,
-                assigned_steps=10,
-                redeployments=0,
-                effort="quick",
-            ),
+            stages=FEW_STEPS,
         )
         outcome = optimize_kit(designs, {"linear": 3, "angular": 2}, settings=settings)
         judge = [

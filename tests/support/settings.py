@@ -2,6 +2,15 @@
 
 from kop_exudyn.search.settings import StageSettings
 
+# A short search that moves the parts to where the objective's terms tell.
+FEW_STEPS = StageSettings(
+    schedule=(1e4,),
+    relaxed_steps=6,
+    assigned_steps=10,
+    reassignments=0,
+    redeployments=0,
+    effort="quick",
+)
 # One accepted step a stage: files and pages don't need more.
 ONE_STEP = StageSettings(
     schedule=(1e4,),

@@ -1,8 +1,19 @@
-"""A small C-shell for tests of files, pages and commands."""
+"""Small C-shells: one for tests of files, pages and commands, two for those of searches."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
+
+from kop_exudyn.io.designs import load_design
+from kop_exudyn.search.dataset import Dataset
+from kop_exudyn.search.events import StageEvent
+from kop_exudyn.search.objective import Weights
+from kop_exudyn.search.pool import DesignPool
+from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.stages import Stages
 
 
 def shell_data(name: str, bow: float = 0.1, **changes: Any) -> dict[str, Any]:
@@ -25,3 +36,18 @@ def shell_data(name: str, bow: float = 0.1, **changes: Any) -> dict[str, Any]:
         "curves": [{"type": "spline", "points": points} for points in along + across],
     }
     return data | changes
+
+
+@contextmanager
+def stages_of_two(
+    repository: Path, settings: StageSettings, observer: Callable[[StageEvent], None]
+) -> Iterator[Stages]:
+    """The stages of two shells of models/small that share 4 linear and 2 angular parts."""
+    shells = [
+        load_design(repository / "models" / "small" / name)
+        for name in ("01_sinh.json", "06_moebius.json")
+    ]
+    with DesignPool(shells) as pool:
+        pool.prepare()
+        dataset = Dataset.of_pool(pool, Weights.suiting(shells))
+        yield Stages(dataset, {"linear": 4, "angular": 2}, settings, observer=observer)

@@ -16,6 +16,7 @@ from ...equilibrium.system import System
 from ...errors import SimulationFailure
 from ...scene.state import State
 from ..fitting import best_placement
+from ..opening import SAME_STATE
 from .deployment import Deployment, Stage, drawn_towards, follow, state_of
 
 if TYPE_CHECKING:
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from .scene import UmbrellaScene
 
 _LIGHT = 0.01  # of the attraction: a guide that strains the mesh little
-_SAME = 1e-3  # of the size: joints this close are in one state
 
 
 class Opened(Protocol):
@@ -120,7 +120,7 @@ class Opening:
         if deployed is not None:
             placed = self._placed_like(deployed.state, found[-1].state)
             apart = placed.positions[design.joints] - deployed.state.positions[design.joints]
-            if np.linalg.norm(apart, axis=1).max() > _SAME * design.target.size:
+            if np.linalg.norm(apart, axis=1).max() > SAME_STATE * design.target.size:
                 return None
         return found
 
