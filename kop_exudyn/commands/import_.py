@@ -4,21 +4,20 @@ our own."""
 from __future__ import annotations
 
 import argparse
-import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .output import add_json, report
+from .import_designs import MATERIALS, undrawn
+from .import_output import by_option, tell
+from .output import add_json
 from .values import angle, held_joints, number_list, number_pair, patch, positive_number
 
 if TYPE_CHECKING:
-    from ..errors import InputError
     from ..exchange.drawing import Finding
     from ..exchange.drawn_networks import DrawnNetwork, ReadingOptions
     from ..exchange.imports import Imported
-    from ..structures.base import Design
     from ..units import Units
 
 HELP = "turn a drawing, a surface or a released umbrella mesh into a design file"
@@ -68,18 +67,6 @@ _NEEDED = {
     "opening": ": the angle that it opens by, as 35deg",
     "section": " WIDTH,HEIGHT of its rods, in the design's unit",
     "material": " YOUNG,POISSON of its rods, in the design's units",
-}
-_MATERIALS = ("arms", "plates")  # of an umbrella mesh
-# Fields of a design file, and the options that they come from.
-_FIELDS = {
-    "opening.angle": "--opening",
-    "held": "--held",
-    "patch": "--patch",
-    "section": "--section",
-    "material.young": "--material",
-    "material.poisson": "--material",
-    "material.density": "--density",
-    "material.elastic_limit": "--elastic-limit",
 }
 
 
@@ -282,11 +269,11 @@ def run(args: argparse.Namespace) -> int:
                 field=f"--{option}",
             )
     if wanted in (None, "umbrella"):
-        if len(args.elastic_limit or ()) > len(_MATERIALS):
+        if len(args.elastic_limit or ()) > len(MATERIALS):
             raise InputError(
                 "expected one limit, or those of arms and plates", field="--elastic-limit"
             )
-        return _undrawn(args)
+        return undrawn(args)
     if args.elastic_limit is not None and len(args.elastic_limit) > 1:
         raise InputError("a drawing's rods have one elastic limit", field="--elastic-limit")
     if not drawn:
@@ -318,7 +305,7 @@ def _drawing(args: argparse.Namespace, wanted: str) -> int:
         if made is None and not drawn.frame.flat and args.surface is None:
             drawn = with_heights_checked(drawn)
     except InputError as error:
-        error = _by_option(error.at(args.file))
+        error = by_option(error.at(args.file))
         if args.preview is not None:
             _save_preview(args, drawn, drawn.findings, units, refused=str(error))
         raise error from None
@@ -420,30 +407,7 @@ def _tell(
         "findings": told,
     }
     opening = args.opening if wanted == "c_shell" else None
-    _report(args, data, import_rows(figures, list(findings), units, opening))
-
-
-def _report(
-    args: argparse.Namespace, data: dict[str, Any], rows: Sequence[tuple[str, str]]
-) -> None:
-    files = "".join(f"{path}\n" for path in (args.out, args.preview) if path is not None)
-    lines = "" if args.quiet else "".join(f"{name:<10} {text}\n" for name, text in rows)
-    report(args, data, files + lines)
-
-
-def _by_option(error: InputError) -> InputError:
-    """The same error, its field named as the option that it was given with."""
-    from ..errors import InputError
-
-    option = next(
-        (o for field, o in _FIELDS.items() if error.field and error.field.startswith(field)), None
-    )
-    if option is None:
-        return error
-    message = error.message
-    if option == "--opening" and isinstance(error.value, float) and abs(error.value) > math.pi:
-        message = f"{message} (pi, in radians); {error.value:g} degrees are {error.value:g}deg"
-    return InputError(message, source=error.source, field=option, value=error.value)
+    tell(args, data, import_rows(figures, list(findings), units, opening))
 
 
 def _require(args: argparse.Namespace, wanted: str, *names: str) -> None:
@@ -469,141 +433,3 @@ def _material(args: argparse.Namespace) -> dict[str, float]:
         "elastic_limit": args.elastic_limit[0] if args.elastic_limit else None,
     }
     return {name: value for name, value in given.items() if value is not None}
-
-
-def _undrawn(args: argparse.Namespace) -> int:
-    """An umbrella mesh on a surface, or a design of another program's file."""
-    from ..errors import InputError
-    from ..files.json_files import write_json
-    from ..structures.base import design_from_dict
-
-    data = _undrawn_data(args)
-    _add_materials(args, data)
-    try:
-        design = design_from_dict(data, str(args.out or args.file))
-    except InputError as error:
-        raise _by_option(
-            InputError(error.message, source=args.file, field=error.field, value=error.value)
-        ) from None
-    if args.preview is not None and design.class_name != "umbrella":
-        raise InputError("shows drawings and umbrella meshes only", field="--preview")
-    if args.out is not None:
-        write_json(args.out, data, overwrite=args.overwrite)
-    figures, rows = _figures(design, data)
-    if args.preview is not None:
-        from ..report.import_preview import umbrella_preview
-
-        page = umbrella_preview(args.file.name, data, rows)
-        page.save(args.preview, overwrite=args.overwrite)
-    told = {"design": args.out, "preview": args.preview, "class": data["class"]}
-    _report(args, told | {"name": data["name"], "summary": figures}, rows)
-    return 0
-
-
-def _add_materials(args: argparse.Namespace, data: dict[str, Any]) -> None:
-    """Density and elastic limits as options give them, in an umbrella mesh's content."""
-    limits = args.elastic_limit or ()
-    materials = data.get("materials", {})
-    for number, name in enumerate(name for name in _MATERIALS if name in materials):
-        if args.density is not None:
-            materials[name]["density"] = args.density
-        if limits:
-            materials[name]["elastic_limit"] = limits[min(number, len(limits) - 1)]
-
-
-def _figures(design: Design, data: dict[str, Any]) -> tuple[dict[str, Any], list[tuple[str, str]]]:
-    """What is told of a design that wasn't drawn: as plain data, and in words."""
-    units = data.get("units")
-    figures: dict[str, Any] = {"joints": len(design.joints), "units": units}
-    if design.class_name != "umbrella":
-        figures["elements"] = design.n_elements
-        rows = [("elements", str(design.n_elements)), ("joints", str(len(design.joints)))]
-    else:
-        lengths = design.parameters
-        figures["cells"] = len(data["lengths"])
-        figures |= {"shortest_arm": float(lengths.min()), "longest_arm": float(lengths.max())}
-        arms = f"{lengths.min():.4g} to {lengths.max():.4g} {data['units']['length']}"
-        rows = [
-            ("cells", str(figures["cells"])),
-            ("joints", f"{figures['joints']} X joints"),
-            ("arms", arms),
-        ]
-    if units is not None:
-        rows.append(("units", f"{units['length']}, {units['force']}"))
-    if "target" not in data and design.class_name == "umbrella":
-        rows.append(("look at", "no target surface: the deployed design itself is taken as one"))
-    return figures, rows
-
-
-def _undrawn_data(args: argparse.Namespace) -> dict[str, Any]:
-    """The content of the design file, of a surface or of a file of another program."""
-    from ..errors import InputError
-    from ..files.documents import is_own
-    from ..files.json_files import is_json_file, json_stem, read_json
-    from ..structures.base import foreign_format, format_names
-
-    data = read_json(args.file) if args.patch is None and is_json_file(args.file) else None
-    if data is not None and is_own(data):  # of any class, in any unit
-        return _converted(args, data)
-    if args.unit not in (None, "mm"):
-        raise InputError(
-            "umbrella meshes are in mm; --scale 1000 makes mm of metres",
-            field="--unit",
-            value=args.unit,
-        )
-    if args.patch is not None:
-        return _umbrella_on_mesh(args)
-    if data is None:
-        raise InputError("an umbrella mesh on a surface needs --patch", source=args.file)
-    foreign = foreign_format(data)
-    if foreign is None or foreign.rewrite is None:
-        raise InputError(
-            f"isn't a {' or a '.join(format_names())}; of a surface, give --patch", source=args.file
-        )
-    own = foreign.rewrite(data, json_stem(args.file), str(args.file))
-    if own["class"] == "umbrella" and args.plates == "rigid":
-        own["plate_model"] = args.plates
-    return own
-
-
-def _converted(args: argparse.Namespace, data: dict[str, Any]) -> dict[str, Any]:
-    """The content of a design file of our own, in the units asked for."""
-    from ..errors import InputError
-    from ..io.conversion import in_units
-    from ..io.designs import load_design
-    from ..io.rescaling import relocated
-    from ..units import Units
-
-    if args.unit is None or data["format"] != "kop_exudyn/design":
-        raise InputError(
-            "is a file of kop_exudyn already: use it as it is (designs: or give --unit, to write "
-            "it in another unit)",
-            source=args.file,
-            field="format",
-        )
-    if args.scale is not None:
-        raise InputError("isn't for designs: --unit says how they are scaled", field="--scale")
-    load_design(args.file)  # refuses what is no design
-    try:
-        converted = in_units(data, Units(args.unit, args.force_unit))
-    except InputError as error:
-        raise error.at(args.file) from None
-    return relocated(converted, args.file.parent, (args.out or args.file).parent)
-
-
-def _umbrella_on_mesh(args: argparse.Namespace) -> dict[str, Any]:
-    from ..errors import InputError
-    from ..structures.umbrella.on_mesh import umbrella_on_mesh
-
-    try:
-        return umbrella_on_mesh(
-            args.file.stem,
-            args.file,
-            args.patch,
-            scale=1.0 if args.scale is None else args.scale,
-            plate_edge=args.plate_edge,
-            density=args.density,
-            plate_model=args.plates,
-        )
-    except InputError as error:
-        raise _by_option(error.at(args.file)) from None
