@@ -81,13 +81,14 @@ def _of_boards(blanks: Blanks) -> Iterator[str]:
             )
     room, options = blanks.options.room, blanks.options
     sizes = {one.label: one.size for one in templates(blanks)}
-    too_large = {label for label, size in sizes.items() if size[0] > room[0] or size[1] > room[1]}
-    # the largest first: a sheet that holds it holds the others
-    for label in sorted(too_large, key=lambda label: -float(np.max(sizes[label]))):
+    too_large = [label for label, size in sizes.items() if size[0] > room[0] or size[1] > room[1]]
+    if not too_large:
+        return
+    largest = np.max([sizes[label] for label in too_large], axis=0)
+    needed = np.maximum(largest + np.subtract(options.sheet, room), options.sheet)
+    w, h = (math.ceil(side / _ROUND) * _ROUND for side in needed.tolist())
+    for label in sorted(too_large, key=lambda label: -float(np.max(sizes[label]))):  # largest first
         width, height = sizes[label]
-        largest = np.max([sizes[label] for label in too_large], axis=0)
-        needed = np.maximum(largest + np.subtract(options.sheet, room), options.sheet)
-        w, h = (math.ceil(side / _ROUND) * _ROUND for side in needed.tolist())
         yield (
             f"part {label} of {width:.0f} x {height:.0f} mm is larger than a sheet's "
             f"{room[0]:.0f} x {room[1]:.0f} mm; --sheet {w},{h} would do"
