@@ -13,6 +13,9 @@ from __future__ import annotations
 import numpy as np
 
 _FLAT = 1e-11  # of the extent: thinner hulls are flat, and narrower ones straight
+# Of the extent: across what is thinner, Qhull may merge facets for ever. Which points and edges a
+# hull has doesn't change when an axis is stretched, so that it is found of a body as thick as wide.
+_THIN = 1e-6
 
 
 def size_of_points(points: np.ndarray) -> float:
@@ -53,8 +56,10 @@ def _polygon(x: np.ndarray) -> float:
 def _polytope(x: np.ndarray) -> float:
     from scipy.spatial import ConvexHull
 
-    hull = ConvexHull(x)
-    normals, corner = hull.equations[:, :3], np.arange(3)
+    stretched = np.ptp(x, axis=0)
+    stretched[stretched >= _THIN] = 1.0
+    hull = ConvexHull(x / stretched)
+    normals, corner = hull.equations[:, :3] / stretched, np.arange(3)  # of any length
     # neighbour k of a triangle lies across the edge opposite to its corner k; each edge comes twice
     ends = [x[hull.simplices[:, (corner + k) % 3]] for k in (1, 2)]
     lengths = np.linalg.norm(ends[1] - ends[0], axis=2)

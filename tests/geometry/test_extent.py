@@ -60,6 +60,22 @@ def test_sizes_neither_turn_nor_move(points, vector, shift, scale, mirror):
     assert found == pytest.approx(scale * size_of_points(points), rel=tolerance)
 
 
+@pytest.mark.parametrize("seed", [0, 251, 445])
+def test_the_hull_of_a_leaf_is_found_however_its_places_are_rounded(seed):
+    """Qhull merged the facets of these for ever."""
+    rng = np.random.default_rng(seed)
+    turn = Rotation.from_rotvec([rng.uniform(-np.pi, np.pi), 0.0, 0.0]).as_matrix()
+    scale = 10.0 ** rng.uniform(-6, 6)
+    placed = scale * (CASES["leaf"] @ turn.T + np.array([0, *rng.uniform(-100, 100, 2)]))
+    assert mean_width(placed) == pytest.approx(2 * scale, rel=1e-7)
+
+
+@pytest.mark.parametrize("thickness", [1e-10, 1e-8, 0.99e-6, 1.01e-6, 1e-4])
+def test_thin_boxes_have_the_mean_width_of_boxes(thickness):
+    box = GRID * [1.0, 2.0, thickness]
+    assert mean_width(box) == pytest.approx(3.0 + thickness, rel=1e-12)
+
+
 @settings(max_examples=50, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_sizes_change_by_no_more_than_their_points(seed):
