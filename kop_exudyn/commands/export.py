@@ -56,7 +56,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
     shop = parser.add_argument_group("workshop", "all in millimetres, whatever the designs are in")
     shop.add_argument(
-        "--sheet", type=number_pair, metavar="W,H", help="size of a sheet (default: 1000,600)"
+        "--sheet",
+        type=number_pair,
+        metavar="W,H",
+        help="size of a sheet (default: 1000,600); where straight pieces are longer, they are sawn "
+        "from bars",
     )
     shop.add_argument(
         "--stock",
@@ -90,12 +94,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    done = _kit(args) if os.path.isdir(args.what) else _design(args)
-    report(args, {"folder": args.out, "files": done}, f"{len(done)} files in {args.out}\n")
+    done, notes = _kit(args) if os.path.isdir(args.what) else (_design(args), [])
+    text = "".join(f"{line}\n" for line in [*notes, f"{len(done)} files in {args.out}"])
+    report(args, {"folder": args.out, "files": done, "notes": notes}, text)
     return 0
 
 
-def _kit(args: argparse.Namespace) -> list[Path]:
+def _kit(args: argparse.Namespace) -> tuple[list[Path], list[str]]:
+    """The files of a kit, and what is to be known of them."""
     from ..errors import InputError
     from ..exchange.export import export_desk
     from ..fabrication.blanks import Blanks
@@ -104,6 +110,7 @@ def _kit(args: argparse.Namespace) -> list[Path]:
     from ..fabrication.options import Tolerances
     from ..fabrication.pieces import parts_list_of
     from ..fabrication.readiness import obstacles, refuse
+    from ..fabrication.sources import sources
     from ..io.datasets import load_designs
     from ..io.saved_runs import load_run
 
@@ -117,7 +124,9 @@ def _kit(args: argparse.Namespace) -> list[Path]:
     result = load_run(args.what, load_designs(args.folder))
     unit, parts = _unit(args, result.units), parts_list_of(result)
     options = _options(args, usual_options(result.designs))
-    found = obstacles(result, Blanks(parts, unit, options) if args.only != "desk" else None)
+    blanks = Blanks(parts, unit, options) if args.only != "desk" else None
+    found = obstacles(result, blanks)
+    note = "" if blanks is None else sources(blanks).note
     if not args.force:
         refuse(found)
     for sentence in found:
@@ -137,7 +146,7 @@ def _kit(args: argparse.Namespace) -> list[Path]:
         )
     if args.only != "workshop":
         done += export_desk(result, args.out / "desk", overwrite=args.overwrite)
-    return done
+    return done, [note] if note else []
 
 
 def _design(args: argparse.Namespace) -> list[Path]:

@@ -256,6 +256,14 @@ class Blanks:
         )
 
     @property
+    def straight(self) -> tuple[tuple[str, int, float], ...]:
+        """Label, pieces to make and length (mm) of every strip and plain bar."""
+        return (
+            *((strip.label, strip.count, strip.cut_length) for strip in self.strips),
+            *((bar.label, bar.count, bar.length) for bar in self.bars),
+        )
+
+    @property
     def problems(self) -> tuple[str, ...]:
         """What stands in the way of cutting these parts, one sentence each; empty where nothing
         does."""

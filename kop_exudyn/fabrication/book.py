@@ -11,6 +11,7 @@ from .cutsheets import Sheet
 from .options import Tolerances
 from .paper import Book
 from .part_pages import cell_pages, plate_pages, sheet_pages, stock_pages, strip_pages
+from .sources import sources
 from .stock import StockPlan
 
 # of cut lists, what stands in the note above or on the parts' own pages
@@ -81,4 +82,6 @@ def _note(blanks: Blanks, tolerances: Tolerances) -> str:
             "are lengths of the axes from the joint to the corner points, "
             f"{blanks.corners.setback:.1f} mm beyond either sawn end."
         )
+    if note := sources(blanks).note:
+        lines.append(note)
     return "\n".join(lines)

@@ -15,7 +15,7 @@ from ..errors import InputError
 from .blanks import Blanks
 from .options import NOTE_ROOM, CutOptions
 from .shapes import NOTES, Polyline, Shape, Template, Text, rectangle
-from .templates import templates
+from .sources import on_sheets, too_large
 
 _NOTE_HEIGHT = 6.0  # mm
 _SCALE_BAR = 100.0  # mm, to check a print with
@@ -37,24 +37,35 @@ class Sheet:
     thickness: float = 0.0
 
 
-def cut_sheets(blanks: Blanks) -> list[Sheet]:
+def cut_sheets(blanks: Blanks, *, force: bool = False) -> list[Sheet]:
     """All pieces that the kit's neediest designs use, on as many sheets as they take; those of one
-    thickness together.
+    thickness together. Straight pieces that only bars hold are left out (see `sources`).
+
+    force : leave out, too, what no sheet holds
 
     Raises InputError where a piece is larger than a sheet; see also `templates`.
     """
-    wanted = templates(blanks)
+    wanted = _wanted(blanks, force)
     return lay_out(wanted, [t.count for t in wanted], "cut sheet", blanks.options)
 
 
-def template_sheets(blanks: Blanks) -> list[Sheet]:
-    """One piece of every part, with its dimensions: templates to check with, or to copy by
-    hand."""
-    wanted = templates(blanks)
+def template_sheets(blanks: Blanks, *, force: bool = False) -> list[Sheet]:
+    """One piece of every part, with its dimensions: templates to check with, or to copy by hand.
+
+    force : as of `cut_sheets`
+    """
+    wanted = _wanted(blanks, force)
     captioned = [
         Template(t.label, t.name, t.count, (*t.shapes, _caption(t)), t.thickness) for t in wanted
     ]
     return lay_out(captioned, [1] * len(wanted), "templates", blanks.options)
+
+
+def _wanted(blanks: Blanks, force: bool) -> list[Template]:
+    """What sheets are laid out with."""
+    wanted = on_sheets(blanks)
+    left_out = {piece.label for piece in too_large(wanted, blanks.options)} if force else set()
+    return [piece for piece in wanted if piece.label not in left_out]
 
 
 def lay_out(
@@ -65,15 +76,14 @@ def lay_out(
     Raises InputError where a piece is larger than a sheet.
     """
     width, height = options.room
-    for template in wanted:
+    for template in too_large(wanted, options):
         size = template.size
-        if size[0] > width or size[1] > height:
-            raise InputError(
-                f"part {template.label} ({size[0]:.0f} x {size[1]:.0f} mm) is larger than a "
-                f"sheet's {width:.0f} x {height:.0f} mm",
-                field="options.sheet",
-                value=options.sheet,
-            )
+        raise InputError(
+            f"part {template.label} ({size[0]:.0f} x {size[1]:.0f} mm) is larger than a "
+            f"sheet's {width:.0f} x {height:.0f} mm",
+            field="options.sheet",
+            value=options.sheet,
+        )
     found = []
     for thickness in sorted({template.thickness for template in wanted}, reverse=True):
         numbers = [k for k, template in enumerate(wanted) if template.thickness == thickness]

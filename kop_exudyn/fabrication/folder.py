@@ -64,7 +64,7 @@ def export_workshop(
     blanks = Blanks(parts, unit, options)
     if not force:
         blanks.check()
-    sheets, bars = cut_sheets(blanks), _bars(blanks, force)
+    sheets, bars = cut_sheets(blanks, force=force), _bars(blanks, force)
     drawings = [assembly_drawing(parts, pieces.design.name, unit) for pieces in parts.designs]
     book = workshop_book(
         blanks, sheets, bars, drawings, paper=paper, title=title, tolerances=tolerances
@@ -87,7 +87,10 @@ def export_workshop(
     done.append(book.save(folder / "workshop.pdf", overwrite=overwrite))
     for drawing in drawings:
         done += save_assembly_drawing(drawing, folder, overwrite=overwrite)
-    for stem, found in {"cut_sheet": sheets, "templates": template_sheets(blanks)}.items():
+    for stem, found in {
+        "cut_sheet": sheets,
+        "templates": template_sheets(blanks, force=force),
+    }.items():
         done += _write_sheets(found, folder / stem, writers, overwrite)
     return done
 

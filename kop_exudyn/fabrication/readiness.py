@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-
-import numpy as np
 
 from ..errors import InputError, SimulationFailure
 from ..search.result import KitResult
 from ..structures.strength import beyond_limit
 from .blanks import Blanks
+from .sources import sheet_for, sources, too_large
 from .templates import templates
-
-_ROUND = 10  # mm, that sizes of sheets are rounded up to
 
 
 def obstacles(result: KitResult, blanks: Blanks | None = None) -> list[str]:
@@ -73,23 +69,17 @@ def _of_designs(result: KitResult) -> Iterator[str]:
 
 def _of_boards(blanks: Blanks) -> Iterator[str]:
     """Pieces that no sheet and no bar is large enough for."""
-    for strip in blanks.strips:
-        if blanks.options.stock and strip.cut_length > max(blanks.options.stock):
+    source, options = sources(blanks), blanks.options
+    if source.problem:
+        yield source.problem
+    straight = {label for label, _, _ in blanks.straight}
+    wanted = [one for one in templates(blanks) if source.problem or one.label not in straight]
+    width, height = options.room
+    large = too_large(wanted, options)
+    for piece in sorted(large, key=lambda one: -float(one.size.max())):  # largest first
+        if piece.label not in straight:
             yield (
-                f"part {strip.label} is {strip.cut_length:.0f} mm long, longer than the longest "
-                f"bar of {max(blanks.options.stock):g} mm; --stock names longer ones"
+                f"part {piece.label} of {piece.size[0]:.0f} x {piece.size[1]:.0f} mm is larger "
+                f"than a sheet's {width:.0f} x {height:.0f} mm; {sheet_for(large, options)} "
+                "would do"
             )
-    room, options = blanks.options.room, blanks.options
-    sizes = {one.label: one.size for one in templates(blanks)}
-    too_large = [label for label, size in sizes.items() if size[0] > room[0] or size[1] > room[1]]
-    if not too_large:
-        return
-    largest = np.max([sizes[label] for label in too_large], axis=0)
-    needed = np.maximum(largest + np.subtract(options.sheet, room), options.sheet)
-    w, h = (math.ceil(side / _ROUND) * _ROUND for side in needed.tolist())
-    for label in sorted(too_large, key=lambda label: -float(np.max(sizes[label]))):  # largest first
-        width, height = sizes[label]
-        yield (
-            f"part {label} of {width:.0f} x {height:.0f} mm is larger than a sheet's "
-            f"{room[0]:.0f} x {room[1]:.0f} mm; --sheet {w},{h} would do"
-        )

@@ -19,6 +19,7 @@ from scipy.optimize import Bounds, LinearConstraint, linprog, milp
 
 from ..errors import InputError
 from .blanks import Blanks
+from .sources import sources
 
 _PAYS = 1e-3  # mm that a new pattern has to save
 _MAX_PATTERNS = 400
@@ -55,16 +56,17 @@ class StockPlan:
 
 
 def stock_plan(blanks: Blanks) -> StockPlan | None:
-    """The bars for all strips of a kit; None without strips, or where no bars are wanted.
+    """The bars for all straight pieces of a kit; None without any, where no bars are wanted, or
+    where a piece is longer than every bar and sheets hold all of them (see `sources`).
 
-    Raises InputError where a strip is longer than every bar.
+    Raises InputError where a piece is longer than every bar and larger than a sheet.
     """
     options = blanks.options
-    if not blanks.strips or not options.stock:
+    if not blanks.straight or not options.stock:
         return None
-    labels = [strip.label for strip in blanks.strips]
-    lengths = [strip.cut_length for strip in blanks.strips]
-    counts = [strip.count for strip in blanks.strips]
+    labels, counts, lengths = zip(*blanks.straight)
+    if max(lengths) > max(options.stock) and sources(blanks).sheets:
+        return None
     return cut_from_bars(labels, lengths, counts, options.stock, options.kerf)
 
 

@@ -204,7 +204,7 @@ def test_the_same_kit_gives_the_same_bytes(parts, tmp_path):
 
 def test_pieces_larger_than_a_sheet_are_refused(parts):
     with pytest.raises(InputError, match="larger than a sheet"):
-        cut_sheets(Blanks(parts, "m", CutOptions(sheet=(200.0, 600.0))))
+        cut_sheets(Blanks(parts, "m", CutOptions(sheet=(200.0, 600.0), stock=())))
 
 
 def test_holes_without_room_are_named_but_strips_can_be_had_alone(parts):

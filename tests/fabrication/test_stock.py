@@ -78,6 +78,6 @@ def test_a_kit_from_bars(parts):
     assert sawn(plan) == needed
     assert stock_plan(Blanks(parts, "m", CutOptions(stock=()))) is None
     with pytest.raises(InputError, match="longer than every bar"):
-        stock_plan(Blanks(parts, "m", CutOptions(stock=(500.0,))))
+        stock_plan(Blanks(parts, "m", CutOptions(sheet=(500.0, 600.0), stock=(500.0,))))
     with pytest.raises(InputError, match="nothing is left of part S2"):
         cut_from_bars(["S1", "S2"], [30.0, -4.0], [2, 1], [100.0])
