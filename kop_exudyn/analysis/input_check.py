@@ -23,11 +23,11 @@ from ..kit.groups import ElementGroup
 from ..kit.kinds import part_kind
 from ..search.input_fit import fit_input
 from ..structures.base import Design, can_be_rescaled
+from ..structures.deviation import OFF_TARGET
 from ..structures.stacking import group_designs, stacked_groups, stacked_parameters
 from ..structures.strength import beyond_limit
 from .simulation import simulate
 
-OFF_TARGET = 1.0  # %: inputs that deviate more than this blame the kit
 _DIVIDE = 1.4  # elements that many times as long as the others' would rather be divided
 _WORTH = 0.05  # of the energy; what gains less is no advice
 _TRIED = 7  # sizes between the smallest and the largest, then as many again about the best one
@@ -94,7 +94,7 @@ class DesignCheck:
                 ""
                 if self.fitted_percent is None
                 else f"; its own parameters could bring that to {self.fitted_percent:.2g} % "
-                "(kop.fit_input in Python; the search for a kit goes there by itself)"
+                "(kop fit does that; the search for a kit goes there by itself)"
             )
             found.append(f"is {self.max_percent:.2g} % off its own target{better}")
         over = {

@@ -9,6 +9,7 @@ All take --json (see `output`), --quiet and --verbose.
 NAMES = (
     "simulate",
     "check",
+    "fit",
     "optimize",
     "tradeoff",
     "import",

@@ -32,7 +32,7 @@ def undrawn(args: argparse.Namespace) -> int:
         raise InputError("shows drawings and umbrella meshes only", field="--preview")
     if args.out is not None:
         write_json(args.out, data, overwrite=args.overwrite)
-    figures, rows = _figures(design, data)
+    figures, rows = _figures(args, design, data)
     if args.preview is not None:
         from ..report.import_preview import umbrella_preview
 
@@ -54,7 +54,17 @@ def _add_materials(args: argparse.Namespace, data: dict[str, Any]) -> None:
             materials[name]["elastic_limit"] = limits[min(number, len(limits) - 1)]
 
 
-def _figures(design: Design, data: dict[str, Any]) -> tuple[dict[str, Any], list[tuple[str, str]]]:
+def _fit_it(args: argparse.Namespace) -> str:
+    """What to do with a mesh whose arms follow from areas alone."""
+    if args.out is None:
+        return "arms follow from areas: once it is written (--out), kop fit brings it nearer"
+    new = args.out.with_name(f"{args.out.stem}_fitted.json")
+    return f"arms follow from areas: kop fit {args.out} --out {new} brings it nearer to its surface"
+
+
+def _figures(
+    args: argparse.Namespace, design: Design, data: dict[str, Any]
+) -> tuple[dict[str, Any], list[tuple[str, str]]]:
     """What is told of a design that wasn't drawn: as plain data, and in words."""
     units = data.get("units")
     figures: dict[str, Any] = {"joints": len(design.joints), "units": units}
@@ -75,6 +85,8 @@ def _figures(design: Design, data: dict[str, Any]) -> tuple[dict[str, Any], list
         rows.append(("units", f"{units['length']}, {units['force']}"))
     if "target" not in data and design.class_name == "umbrella":
         rows.append(("look at", "no target surface: the deployed design itself is taken as one"))
+    elif design.class_name == "umbrella" and args.patch is not None:
+        rows.append(("next", _fit_it(args)))
     return figures, rows
 
 

@@ -129,6 +129,7 @@ def _gravity(design: Design, args: argparse.Namespace) -> np.ndarray:
 
 def _summary(result: dict, units: Units | None) -> str:
     """The result in a few lines."""
+    from ..structures.deviation import OFF_TARGET
     from ..units import with_unit
 
     exudyn, fit = result["exudyn"], result["fit"]
@@ -136,7 +137,8 @@ def _summary(result: dict, units: Units | None) -> str:
         "design": result["design"],
         "model": f"{result['elements']:,} elements, {result['unknowns']:,} unknowns",
         "deviation": f"max {fit['max_percent']:.3g} %, mean {fit['mean_percent']:.3g} % "
-        f"of the target's size; max {with_unit(fit['max'], 'length', units, 3)}",
+        f"of the target's size; max {with_unit(fit['max'], 'length', units, 3)}"
+        + (" (kop fit may lower it)" if fit["max_percent"] > OFF_TARGET else ""),
         "displacement": f"max {result['displaced_percent']:.3g} % from the joints' own places",
         "elastic energy": with_unit(result["elastic_energy"], "energy", units, 6),
         "stable": "yes" if result["stable"] else "no",

@@ -8,11 +8,12 @@ import os
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 from ..errors import InputError
 from ..files.documents import check_envelope, check_range, check_schema, has_schema, is_own
 from ..files.files import reason_of
-from ..files.json_files import JSON_ENDINGS, read_json
+from ..files.json_files import JSON_ENDINGS, json_stem, read_json
 from ..structures.base import Design, design_from_dict, foreign_format
 from ..units import common_units, unnamed_units
 
@@ -45,6 +46,21 @@ def load_design(path: str | Path) -> Design:
         return design_from_dict(data, str(path))
     except InputError as error:
         raise error.at(path) from None
+
+
+def own_content(path: str | Path) -> dict[str, Any]:
+    """The content of a design file, in our own format whatever its own is.
+
+    Raises InputError as `load_design` does, and for formats that can only be read.
+    """
+    load_design(path)  # refuses what is no design
+    data = read_json(path)
+    foreign = None if is_own(data) else foreign_format(data)
+    if foreign is None:
+        return data
+    if foreign.rewrite is None:
+        raise InputError("can be read, but not written as a design file of our own", source=path)
+    return foreign.rewrite(data, json_stem(Path(path)), str(path))
 
 
 def load_all(files: Iterable[Path], source: str | Path) -> list[Design]:

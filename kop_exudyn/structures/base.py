@@ -151,6 +151,20 @@ class Design(ABC):
         file."""
         return self.middle + state.positions[self.joints]
 
+    def file_with(self, data: Mapping[str, Any], q: Parameters) -> dict[str, Any]:
+        """The content of a design file like the design's own, with other parameters.
+
+        data : of the design's own file; q : (nq,)
+
+        Raises InputError for classes whose files have no fields for parameters.
+        """
+        raise InputError(
+            "files of this class have no fields for other parameters than those that follow from "
+            "the rest of them",
+            field="class",
+            value=self.class_name,
+        )
+
     @property
     def hardware(self) -> CellHardware | None:
         """Arms and plates, of classes whose parts are cells; None of others."""

@@ -18,6 +18,8 @@ from ..scene.state import State
 from .base import Design, Target
 from .fitting import FitResult
 
+OFF_TARGET = 1.0  # %: inputs that deviate more than this blame the kit
+
 
 @dataclass(frozen=True)
 class Deviation:

@@ -80,9 +80,10 @@ class Numbering:
             raise InputError("must be positive", field=f"{field}.lengths", value=shortest)
         return replace(self, parameters=parameters)
 
-    def split(self, parameters: np.ndarray, digits: int = 9) -> dict[str, list[float]]:
-        """Values for `replaced`, rounded: of parameters (nq,)."""
-        rounded = np.round(parameters, digits)
+    def split(self, parameters: np.ndarray, digits: int | None = None) -> dict[str, list[float]]:
+        """Values for `replaced`: of parameters (nq,), rounded to so many decimals, or as they
+        are."""
+        rounded = parameters if digits is None else np.round(parameters, digits)
         return {
             "lengths": rounded[self.is_length].tolist(),
             "angles": rounded[~self.is_length].tolist(),
@@ -96,6 +97,13 @@ class Numbering:
             np.where(self.is_length, np.minimum(shortest, self.parameters), -largest_corner),
             np.where(self.is_length, np.inf, largest_corner),
         )
+
+
+def rescaled_values(
+    values: Mapping[str, Sequence[float]], factor: float
+) -> dict[str, Sequence[float]]:
+    """Values for `Numbering.replaced` of a design at another size: lengths times a factor."""
+    return {**values, "lengths": [factor * length for length in values["lengths"]]}
 
 
 def number_pieces(

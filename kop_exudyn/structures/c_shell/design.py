@@ -46,6 +46,7 @@ from ..base import (
     register_rescaling,
 )
 from ..mesh_target import check_target_size, load_target_mesh, target_on_mesh
+from ..numbering import rescaled_values
 from ..opening import Station, Way
 from .opening import check_hinges, check_opening
 from .scene import RodModel, lay_out, shell_scene
@@ -73,9 +74,11 @@ class CShell(Design):
     rest : "planar" or "imperfect", see the module
     target_mesh : surface to keep to, instead of the surface through the smooth design's deployed
         rods
+    straightened : "lengths" and "angles" in place of those that follow from the curves, see
+        `Numbering.replaced`: of a design that was fitted to its target
 
     Raises InputError where one corner can't follow the curve between two joints, or the curves
-    enclose no face.
+    enclose no face, and for values that are none of the straightened curves.
     """
 
     class_name = "c_shell"
@@ -91,11 +94,14 @@ class CShell(Design):
         side: int = 1,
         rest: str = "planar",
         target_mesh: TriangleSurface | None = None,
+        straightened: Mapping[str, Any] | None = None,
     ):
         self.name, self.network, self.model = name, network, model
         self.opening, self.side, self.rest, self.target_mesh = opening, side, rest, target_mesh
         self.layout = lay_out(network, model.elements)
         numbering = self.layout.numbering
+        if straightened is not None:
+            numbering = numbering.replaced(straightened, "straightened")
         self.parameters, self.groups, self.joints = (
             numbering.parameters,
             numbering.groups,
@@ -233,6 +239,9 @@ class CShell(Design):
     ) -> dict[str, Equilibrium]:
         """The flat assembly, and the states at all stations."""
         return {"rest": equilibria["rest"], **super().opened_through(q, equilibria)}
+
+    def file_with(self, data: Mapping[str, Any], q: np.ndarray) -> dict[str, Any]:
+        return {**data, "straightened": self.layout.numbering.split(q)}
 
     @property
     def _rest_opening(self) -> float:
@@ -386,6 +395,7 @@ def read_c_shell(data: Mapping[str, Any], source: str) -> CShell:
             side=-1 if opening.get("side") == "down" else 1,
             rest=data.get("rest", "planar"),
             target_mesh=mesh,
+            straightened=data.get("straightened"),
         )
     except InputError as error:
         raise error.at(source) from None
@@ -429,6 +439,8 @@ def rescaled_c_shell(data: Mapping[str, Any], factor: float) -> dict[str, Any]:
             joint | {"near": larger([joint["near"]])[0]} if "near" in joint else joint
             for joint in data["crossings"]
         ]
+    if "straightened" in data:
+        found["straightened"] = rescaled_values(data["straightened"], factor)
     if "target" in data:
         found["target"] = data["target"] | {"scale": factor * data["target"].get("scale", 1.0)}
     return found

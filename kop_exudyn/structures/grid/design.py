@@ -23,6 +23,7 @@ from ...geometry.surfaces import PLAN_AXES, AnalyticSurface, ScaledSurface, Surf
 from ...rods.sections import Material, Section, material_from_dict, section_from_dict
 from ..base import Design, Role, Solve, Target, register_class, register_rescaling
 from ..loads import hold_in_place
+from ..numbering import rescaled_values
 from .grid_network import network_on
 from .lamellas import straighten_on
 
@@ -120,6 +121,9 @@ class Grid(Design):
                 )
             )
             raise SimulationFailure(f"{failure.reason}{hint}", where="deployed state") from None
+
+    def file_with(self, data: Mapping[str, Any], q: np.ndarray) -> dict[str, Any]:
+        return {**data, "straightened": self.straight.numbering.split(q)}
 
     @cached_property
     def target(self) -> Target:
@@ -300,6 +304,5 @@ def rescaled_grid(data: Mapping[str, Any], factor: float) -> dict[str, Any]:
     size = factor * data["surface"].get("size", 1.0)
     resized = {**data, "surface": {**data["surface"], "size": size}}
     if (given := data.get("straightened")) is not None:
-        lengths = (factor * np.array(given["lengths"], float)).tolist()
-        resized["straightened"] = {**given, "lengths": lengths}
+        resized["straightened"] = rescaled_values(given, factor)
     return resized

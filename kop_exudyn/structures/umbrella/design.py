@@ -272,6 +272,14 @@ class Umbrella(Design):
         file."""
         return self.middle + self._bodies.positions(state)
 
+    def file_with(self, data: Mapping[str, Any], q: np.ndarray) -> dict[str, Any]:
+        n = self.mesh.lengths.size
+        found = {**data, "lengths": q[:n].reshape(-1, 2).tolist()}
+        if self.pins is not None:
+            places = q[n:].reshape(-1, 3) + self.middle
+            found["pins"] = {**data["pins"], "positions": places.tolist()}
+        return found
+
     @property
     def hardware(self) -> CellHardware:
         return cell_hardware(self.mesh)
