@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .import_designs import MATERIALS, undrawn
+from .import_options import check_options
 from .import_output import by_option, tell
 from .output import add_json
 from .values import angle, held_joints, number_list, number_pair, patch, positive_number
@@ -32,10 +33,10 @@ DESCRIPTION = """Writes a design file from
   a surface (with --patch; a mesh: .obj, .ply, .stl, .off, or .json of COMPAS): an umbrella mesh in the shape of its
   middle, in millimetres, the arms as long as the cells have to grow.
 
-  a design file of a C-shell or a grid (.json), with --unit: the same design in other units.
+  a design file (.json), with --unit: the same design in other units.
 
-  an umbrella mesh in the format of its public release (.json or .json.gz): the same mesh, in millimetres. Such files
-  can also be used directly wherever a design is expected.
+  an umbrella mesh in the format of its public release (.json or .json.gz): the same mesh, in millimetres, or in --unit.
+  Such files can also be used directly wherever a design is expected, in millimetres.
 
 What was understood is printed, and drawn with --preview; without --out that is all that is done."""  # noqa: E501  # a command on one line can be copied
 EXAMPLES = """examples:
@@ -50,18 +51,6 @@ EXAMPLES = """examples:
   kop import hemisphere_5t.json.gz --out hemisphere.json --plates rigid"""  # noqa: E501  # a command on one line can be copied
 
 _CLASSES = ("c_shell", "grid", "umbrella")
-# Options that only some classes have: of others they would be passed over without a word.
-_OF_CLASSES = {
-    "opening": ("c_shell",),
-    "target": ("c_shell",),
-    "surface": ("grid",),
-    "held": ("grid",),
-    "patch": ("umbrella",),
-    "section": ("c_shell", "grid"),
-    "material": ("c_shell", "grid"),
-    "layer": ("c_shell", "grid"),
-    "tolerance": ("c_shell", "grid"),
-}
 # What an option that a design needs is, with an example.
 _NEEDED = {
     "opening": ": the angle that it opens by, as 35deg",
@@ -261,13 +250,6 @@ def run(args: argparse.Namespace) -> int:
     surface = args.kind is None and is_drawing(args.file) and is_surface(args.file)
     drawn = args.edges or (is_drawing(args.file) and not surface)
     wanted = args.kind or ("c_shell" if drawn and args.patch is None else None)
-    lacks_patch = drawn and wanted == "umbrella" and args.patch is None  # is said below
-    for option, classes in () if lacks_patch else _OF_CLASSES.items():
-        if getattr(args, option) not in (None, []) and (wanted or "umbrella") not in classes:
-            raise InputError(
-                f"isn't for this import: it is for designs of class {' and '.join(classes)}",
-                field=f"--{option}",
-            )
     if wanted in (None, "umbrella"):
         if len(args.elastic_limit or ()) > len(MATERIALS):
             raise InputError(
@@ -283,6 +265,7 @@ def run(args: argparse.Namespace) -> int:
             field="--as",
             value=wanted,
         )
+    check_options(args, wanted)
     return _drawing(args, wanted)
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
+from .import_options import check_options
 from .import_output import by_option, tell
 
 if TYPE_CHECKING:
@@ -95,18 +96,22 @@ def _content(args: argparse.Namespace) -> dict[str, Any]:
     from ..errors import InputError
     from ..files.documents import is_own
     from ..files.json_files import is_json_file, json_stem, read_json
+    from ..io.conversion import in_units
     from ..structures.base import foreign_format, format_names
+    from ..units import Units
 
     data = read_json(args.file) if args.patch is None and is_json_file(args.file) else None
     if data is not None and is_own(data):  # of any class, in any unit
         return _converted(args, data)
-    if args.unit not in (None, "mm"):
-        raise InputError(
-            "umbrella meshes are in mm; --scale 1000 makes mm of metres",
-            field="--unit",
-            value=args.unit,
-        )
     if args.patch is not None:
+        check_options(args, "patch")
+        if args.unit not in (None, "mm"):
+            raise InputError(
+                "umbrella meshes are laid out in mm: --scale 1000 makes mm of metres; the design "
+                f"can be written in {args.unit} afterwards (kop import DESIGN --unit {args.unit})",
+                field="--unit",
+                value=args.unit,
+            )
         return _umbrella_on_mesh(args)
     if data is None:
         raise InputError("an umbrella mesh on a surface needs --patch", source=args.file)
@@ -115,10 +120,14 @@ def _content(args: argparse.Namespace) -> dict[str, Any]:
         raise InputError(
             f"isn't a {' or a '.join(format_names())}; of a surface, give --patch", source=args.file
         )
+    check_options(args, "release")
     own = foreign.rewrite(data, json_stem(args.file), str(args.file))
     if own["class"] == "umbrella" and args.plates == "rigid":
         own["plate_model"] = args.plates
-    return own
+    if args.unit is None and args.force_unit == args.command.get_default("force_unit"):
+        return own
+    length = own.get("units", {}).get("length") if args.unit is None else args.unit
+    return in_units(own, Units(length, args.force_unit))
 
 
 def _converted(args: argparse.Namespace, data: dict[str, Any]) -> dict[str, Any]:
@@ -138,7 +147,10 @@ def _converted(args: argparse.Namespace, data: dict[str, Any]) -> dict[str, Any]
         )
     if args.scale is not None:
         raise InputError("isn't for designs: --unit says how they are scaled", field="--scale")
+    check_options(args, "design")
     load_design(args.file)  # refuses what is no design
+    if args.kind not in (None, data["class"]):
+        raise InputError(f"is a design of class {data['class']}", source=args.file, field="--as")
     try:
         converted = in_units(data, Units(args.unit, args.force_unit))
     except InputError as error:

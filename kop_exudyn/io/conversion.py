@@ -26,6 +26,14 @@ _SECTION = {
 }
 # a density is mass / length^3 = force s^2 / length^4
 _MATERIAL = {"young": (-2, 1), "elastic_limit": (-2, 1), "density": (-4, 1)}
+# of umbrella meshes, whose lengths are all their own: they share no surface or curves at a scale
+_UMBRELLA: dict[str, Mapping[str, Any]] = {
+    "base": {"vertices": (1, 0)},
+    "plates": dict.fromkeys(("arm_position", "thickness", "width", "spacing"), (1, 0)),
+    "materials": {"arms": _MATERIAL, "plates": _MATERIAL},
+    "target": {"vertices": (1, 0), "crossings": (1, 0), "plates": (1, 0)},
+    "pins": {"positions": (1, 0)},
+}
 _LOADS = {"gravity": (1, 0), "line": (-1, 1), "area": (-2, 1), "plan": (-2, 1)}
 
 
@@ -35,8 +43,8 @@ def in_units(data: Mapping[str, Any], units: Units) -> dict[str, Any]:
     data : of a file that has been read as a design
     units : that its numbers will have
 
-    Raises InputError where the design names no units, or is of a class that can't be at another
-    size; umbrella meshes stay in the unit that they were imported in.
+    Raises InputError where the design names no units, or is of a class whose numbers aren't known
+    here and that can't be at another size.
     """
     old = units_from_dict(data.get("units"))
     if old is None:
@@ -51,12 +59,20 @@ def in_units(data: Mapping[str, Any], units: Units) -> dict[str, Any]:
         factor = length ** powers[0] * force ** powers[1]
 
         def converted(value: Any) -> Any:
+            if value is None:  # a place that isn't known
+                return None
             return [converted(x) for x in value] if isinstance(value, list) else factor * value
 
         return converted
 
-    def fields(content: Mapping[str, Any], powers: Mapping[str, tuple[int, int]]) -> dict[str, Any]:
-        return {k: times(powers[k])(v) if k in powers else v for k, v in content.items()}
+    def fields(content: Mapping[str, Any], powers: Mapping[str, Any]) -> dict[str, Any]:
+        """Numbers by their powers; a mapping of powers is of the fields within."""
+        found = dict(content)
+        for name in powers.keys() & content.keys():
+            inner = isinstance(powers[name], Mapping)
+            own = content[name]
+            found[name] = fields(own, powers[name]) if inner else times(powers[name])(own)
+        return found
 
     def loads(content: Mapping[str, Any]) -> dict[str, Any]:
         found = fields(content, _LOADS)
@@ -72,7 +88,10 @@ def in_units(data: Mapping[str, Any], units: Units) -> dict[str, Any]:
             field="origin",
             value=data["origin"],
         )
-    found = rescaled(data, length) if length != 1 else dict(data)
+    if data["class"] == "umbrella":
+        found = fields(data, {**_UMBRELLA, "lengths": (1, 0), "least_length": (1, 0)})
+    else:
+        found = rescaled(data, length) if length != 1 else dict(data)
     found |= {"units": units.to_dict()}
     for name, powers in (("section", _SECTION), ("material", _MATERIAL)):
         if name in found:

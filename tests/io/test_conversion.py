@@ -103,15 +103,49 @@ def test_units_agree_after_the_command_that_the_error_names(repository, tmp_path
     assert json.loads((folder / "b.json").read_text())["units"] == {"length": "m", "force": "N"}
 
 
-def test_what_cannot_be_converted_is_told(repository, tmp_path, capsys):
+def test_an_umbrella_mesh_in_metres(repository, tmp_path, capsys):
+    """Arms, plates, materials, target and pins: the same state; and back."""
+    old = tmp_path / "mm.json"
+    data = json.loads((repository / "models" / "umbrellas" / "dome.json").read_text())
+    data |= {"pins": {"joints": "corners"}, "least_length": 31.0}
+    old.write_text(json.dumps(data))
+    new = tmp_path / "m.json"
+    told(capsys, "import", old, "--unit", "m", "--out", new)
+    a, b = (told(capsys, "simulate", file) for file in (old, new))
+    assert b["units"] == {"length": "m", "force": "N"} and b["stable"]
+    assert b["elastic_energy"] == pytest.approx(1e-3 * a["elastic_energy"], rel=1e-6)
+    assert b["fit"]["max"] == pytest.approx(1e-3 * a["fit"]["max"], rel=1e-4)
+    stress = [x["strength"]["deployed"]["equivalent_stress"] for x in (a, b)]
+    assert stress[1] == pytest.approx(1e6 * stress[0], rel=1e-5)
+    np.testing.assert_allclose(b["joints"], 1e-3 * np.array(a["joints"]), atol=1e-8)
+    back = in_units(json.loads(new.read_text()), Units("mm"))
+    assert back["materials"]["arms"] == pytest.approx(data["materials"]["arms"])
+    assert back["plates"] == pytest.approx(data["plates"])
+    assert back["least_length"] == pytest.approx(31.0)
+    np.testing.assert_allclose(back["target"]["crossings"], data["target"]["crossings"])
+
+
+def test_places_that_are_not_known_stay_so():
+    data = {"class": "umbrella", "units": {"length": "mm"}, "target": {"plates": [None, [1, 2, 3]]}}
+    assert in_units(data, Units("m"))["target"]["plates"] == [None, [1e-3, 2e-3, 3e-3]]
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("--density", "3"), ("--curves", "polyline"), ("--plates", "rigid"), ("--tolerance", "0.1")],
+)
+def test_a_design_in_other_units_takes_no_other_options(option, value, repository, capsys):
+    """They were passed over without a word."""
+    dome = repository / "models" / "umbrellas" / "dome.json"
+    assert main(["import", str(dome), "--unit", "m", option, value]) == 2
+    assert f"{option}: isn't for this import" in capsys.readouterr().err
+
+
+def test_what_cannot_be_converted_is_told(repository):
     data = model(repository, "small/01_sinh.json")
     del data["units"]
     with pytest.raises(InputError, match="names no units"):
         in_units(data, Units("mm"))
-    dome = repository / "models" / "umbrellas" / "dome.json"
-    out = tmp_path / "out.json"
-    assert main(["import", str(dome), "--unit", "m", "--out", str(out)]) == 2
-    assert "can't be rescaled" in capsys.readouterr().err and not out.exists()
     grid = model(repository, "grids/06_mesh.json", origin=[1e6, 0.0, 0.0])
     with pytest.raises(InputError, match="drawn far away"):
         in_units(grid, Units("mm"))

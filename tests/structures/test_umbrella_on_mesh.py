@@ -75,7 +75,7 @@ def test_compas_meshes_give_the_same_design(surface, write_json_file):
         ((), "an umbrella mesh on a surface needs --patch"),
         (("--patch", "circle,3"), "--patch = 'circle': unknown shape"),
         (("--patch", "hexa,3"), "did you mean 'hexagon'?"),
-        (("--patch", "hexagon,2", "--unit", "m"), "umbrella meshes are in mm"),
+        (("--patch", "hexagon,2", "--unit", "m"), "umbrella meshes are laid out in mm"),
         (("--patch", "hexagon,2", "--layer", "a"), "--layer: isn't for this import"),
         (("--patch", "hexagon,2", "--elastic-limit", "1,2,3"), "expected one limit, or"),
         (
