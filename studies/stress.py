@@ -61,7 +61,7 @@ Tried = list[tuple[StressCase, Outcome]]
 
 def main() -> None:
     study = Study.from_command_line(__doc__, __file__)
-    share = 100 if study.quick else 1
+    share, effort = (200, "quick") if study.quick else (1, "normal")
     library()  # compiled now, where it has to be
     classical = classical_cases(CLASSICAL[:1] if study.quick else CLASSICAL)
     random = [tried(seed) for seed in tqdm(range(1000 // share), "random structures", disable=None)]
@@ -73,8 +73,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         fuzzed = fuzz(tqdm(range(100_000 // share), "damaged files", disable=None), Path(folder))
         memory = peak_memory_mb()
-        interrupted = interruptions(5 if study.quick else 1)
-        killed = kill_processes(Path(folder), max(1, 50 // share))
+        interrupted = interruptions(5 if study.quick else 1, effort)
+        killed = kill_processes(Path(folder), max(1, 50 // share), effort)
 
     both = random + symmetric
     stable, forbidden = sum(o.verdict == STABLE for _, o in both), sum(o.forbidden for _, o in both)
@@ -215,10 +215,10 @@ def invariances(seeds: range) -> dict[str, dict[str, list[int]]]:
     return found
 
 
-def interruptions(every: int) -> dict[str, int]:
+def interruptions(every: int, effort: str) -> dict[str, int]:
     """A small job interrupted at every so many of its checkpoints, before and after it is kept, and
     gone on with."""
-    settings = JobSettings(jobs=1, stages=StageSettings(schedule=(1e3, 1e5)))
+    settings = JobSettings(jobs=1, stages=StageSettings(schedule=(1e3, 1e5), effort=effort))
     store, events, found = MemoryStore(), [], Counter()
     expected = fingerprint(
         optimize_kit(
@@ -235,16 +235,17 @@ def interruptions(every: int) -> dict[str, int]:
     return dict(found)
 
 
-def kill_processes(folder: Path, wanted: int) -> dict[str, int]:
-    """SIGKILL at random moments, up to three a run, until so many have hit."""
+def kill_processes(folder: Path, wanted: int, effort: str) -> dict[str, int]:
+    """SIGKILL at random moments, up to three a run, until at least so many have hit."""
     designs = kills.write_designs(folder / "designs")
-    kills.finish(kills.start(designs, folder / "good"))
+    kills.finish(kills.start(designs, folder / "good", effort))
     expected, steps = kills.outcome(folder / "good"), kills.steps_kept(folder / "good")
     found, seed = Counter(), 0
     with tqdm(total=wanted, desc="kills", disable=None) as bar:
         while found["kills"] < wanted:
             out = folder / f"killed_{seed}"
-            hits, kept = kills.killed_and_resumed(designs, out, kills.random_delays(seed, 1.5, 3))
+            delays = kills.random_delays(seed, 1.5, min(3, wanted))
+            hits, kept = kills.killed_and_resumed(designs, out, delays, effort)
             found["kills"] += hits
             found["of them between the first and the last step"] += sum(0 < k < steps for k in kept)
             found["runs"] += 1

@@ -65,6 +65,7 @@ class DesignCheck:
     best_scale, scale_gain_percent : the size that suits the others best, and by how much that
         lowers the projection energy of lengths; 1 and 0 for classes that have one size
     expensive : elements that cost most
+    cautions : what its class has to say of it, see `Design.cautions`
     """
 
     name: str
@@ -82,6 +83,7 @@ class DesignCheck:
     best_scale: float = 1.0
     scale_gain_percent: float = 0.0
     expensive: list[ElementCost] = field(default_factory=list)
+    cautions: list[str] = field(default_factory=list)
 
     @property
     def problems(self) -> list[str]:
@@ -153,7 +155,7 @@ def check_designs(
     A design that can't be simulated is told so; the rest is told of it all the same. Raises
     InputError for numbers of parts that can't be.
     """
-    found = [DesignCheck(design.name) for design in designs]
+    found = [DesignCheck(design.name, cautions=design.cautions) for design in designs]
     _add_shares(found, designs, parts, shown)  # refuses impossible numbers before all else
     for check, design in zip(found, designs):
         _simulate(check, design, fit)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,11 +21,13 @@ from ..scene.limits import HingeLimits
 from ..structures.base import Design
 from ..structures.deviation import fit_summary
 from ..structures.fitting import FitResult, TargetFitting
-from ..structures.loading import LoadedState, loaded_state
 from ..structures.loads import LoadCase
 from ..structures.plausibility import design_doubts
 from ..structures.strength import Strength, design_strength, strength_summary
-from .load_check import LoadCheck, check_load
+
+if TYPE_CHECKING:
+    from ..structures.loading import LoadedState
+    from .load_check import LoadCheck
 
 log = logging.getLogger(__name__)
 
@@ -201,9 +203,17 @@ def simulate(design: Design, loads: LoadCase | None = None, engine: str = FAST) 
     joints = design.report_positions(confirmations[fitted].state)
     fit = TargetFitting(target)(confirmations[fitted].state.positions[design.joints])
     system = design.systems[fitted]
-    loaded = None if loads.empty else loaded_state(design, equilibria[fitted], loads, engine=engine)
+    loaded: LoadedState | None = None
+    checks: tuple[LoadCheck, ...] = ()
+    if not loads.empty:
+        from ..structures.loading import loaded_state  # most designs are simulated without
+
+        loaded = loaded_state(design, equilibria[fitted], loads, engine=engine)
     cases = design.load_cases if loads is design.loads else ()
-    checks = tuple(check_load(design, equilibria[fitted], case) for case in cases)
+    if cases:
+        from .load_check import check_load
+
+        checks = tuple(check_load(design, equilibria[fitted], case) for case in cases)
     result = SimulationResult(
         design,
         system.n_unknowns,

@@ -137,6 +137,7 @@ def _text(checks: list[DesignCheck], parts: Mapping[str, int], units: Units | No
                 f"of {_sizes(cost, units, part=True)}: {cost.percent:.2g} % of the energy"
             )
         lines += [f"  PROBLEM: {problem}" for problem in check.problems]
+        lines += [f"  caution: {caution}" for caution in check.cautions]
         lines += [f"  advice: {advice}" for advice in check.advice]
     return "\n".join(lines) + "\n"
 

@@ -45,21 +45,26 @@ class Label:
         turn = np.radians(self.angle)
         along = width * np.array([np.cos(turn), np.sin(turn)])
         across = height * np.array([-np.sin(turn), np.cos(turn)])
-        corners = [at - along - across, at + along - across, at + along + across]
-        return shapely.Polygon([*corners, at - along + across])
+        return shapely.polygons(
+            [at - along - across, at + along - across, at + along + across, at - along + across]
+        )
+
+
+def text_extent(text: str, size: float, weight: str = "normal") -> tuple[float, float]:
+    """Width and height of a text in mm."""
+    lines = text.split("\n")
+    width = max((_width(line, weight) for line in lines), default=0.0)
+    height = 1.0 + _LINE * (len(lines) - 1)
+    return size * width * MM_A_POINT, size * height * MM_A_POINT
 
 
 @cache
-def text_extent(text: str, size: float, weight: str = "normal") -> tuple[float, float]:
-    """Width and height of a text in mm."""
-    font = FontProperties(family="DejaVu Sans", size=size, weight=weight)
-    lines = text.split("\n")
-    width = max(
-        (TextPath((0, 0), line, prop=font).get_extents().width for line in lines if line.strip()),
-        default=0.0,
-    )
-    height = size * (1.0 + _LINE * (len(lines) - 1))
-    return float(width) * MM_A_POINT, height * MM_A_POINT
+def _width(line: str, weight: str) -> float:
+    """Of a line of text, in sizes; outlines grow with the size."""
+    if not line.strip():
+        return 0.0
+    font = FontProperties(family="DejaVu Sans", size=1.0, weight=weight)
+    return float(TextPath((0, 0), line, prop=font).get_extents().width)
 
 
 def place(
@@ -93,10 +98,11 @@ def place(
         keep(shape)
     found, crowded = [], 0
     for label in labels:
-        free = [at for at in label.places if is_free(label.box(at))]
-        clear = (at for at in free if not len(lines.query(label.box(at), "intersects")))
-        at = next(clear, free[0] if free else label.places[0])
+        boxes = [label.box(at) for at in label.places]
+        free = [k for k, box in enumerate(boxes) if is_free(box)]
+        clear = (k for k in free if not len(lines.query(boxes[k], "intersects")))
+        chosen = next(clear, free[0] if free else 0)
         crowded += not free
-        keep(label.box(at))
-        found.append(np.asarray(at, float))
+        keep(boxes[chosen])
+        found.append(np.asarray(label.places[chosen], float))
     return found, crowded

@@ -19,7 +19,6 @@ from ..drawing.colours import kit_colours, part_colours
 from ..equilibrium.equilibria import Equilibrium
 from ..fabrication.pieces import PartsList
 from ..fabrication.placement import PlacedPieces
-from ..geometry.triangles import TriangleSurface
 from ..scene.scene import Scene
 from ..search.objective import Evaluation
 from ..structures.base import Design, Target
@@ -85,9 +84,8 @@ class DesignState:
         lie beside it."""
         if self.target is None or self.design.beside_target:
             return np.full(len(self.points), np.nan)
-        surface = TriangleSurface(self.target.vertices, self.target.faces)
         here = self.placement.apply(self.scene.node_poses(self.equilibrium.state)[0])
-        return np.sqrt(surface.closest(here).squared_distances)
+        return np.sqrt(self.target.surface.closest(here).squared_distances)
 
     @property
     def lines(self) -> list[np.ndarray]:

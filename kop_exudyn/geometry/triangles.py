@@ -14,6 +14,7 @@ from .extent import size_of_points
 
 # Barycentric coordinates below this are zero: the closest point lies on an edge or a vertex.
 _ON_EDGE = 1e-10
+_NEXT, _LAST = [1, 2, 0], [2, 0, 1]  # of three, from each on
 _LARGEST = 1e150  # of coordinates, whose squares don't overflow
 # A point belongs to a face when its offset from the surface is normal to the face up to these
 # errors.
@@ -144,11 +145,16 @@ class TriangleSurface:
 
 def barycentric(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """(n, 3) barycentric coordinates of points (n, 3) in triangles with these corners (n, 3, 3)."""
-    opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
-    inward = points[:, None, :] - np.roll(corners, -1, axis=1)
-    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    parts = np.einsum("nck,nk->nc", np.cross(opposite, inward), area)
+    second, third = corners[:, _NEXT], corners[:, _LAST]
+    inward = points[:, None, :] - second
+    area = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    parts = np.einsum("nck,nk->nc", _cross(third - second, inward), area)
     return parts / np.einsum("nk,nk->n", area, area)[:, None]
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Products (..., 3) of vectors (..., 3); of few of them three times as fast as numpy.cross."""
+    return a[..., _NEXT] * b[..., _LAST] - a[..., _LAST] * b[..., _NEXT]
 
 
 def _vertices(values: Any) -> np.ndarray:

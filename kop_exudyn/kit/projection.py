@@ -127,11 +127,6 @@ class Projection:
         _, difference, weights = self._difference(q, kit, assignment)
         return weights * difference
 
-    def part_gradient(self, q: np.ndarray, kit: Kit, assignment: Assignment) -> np.ndarray:
-        """(n_p,) derivative in the parts; zero at the minimum where no bound is active."""
-        matrix, difference, weights = self._difference(q, kit, assignment)
-        return self._part_weights(kit) * kit.vector - matrix.T @ (weights * difference)
-
     def hessian(self, q: np.ndarray, kit: Kit, assignment: Assignment) -> ProjectionHessian:
         """Exact second derivatives over (q, p) for this assignment."""
         matrix, active = assignment.contact(q, kit)

@@ -17,7 +17,6 @@ from ..equilibrium.newton import solve
 from ..errors import SimulationFailure
 from ..fabrication.pieces import DesignPieces, PartsList, parts_list_of
 from ..fabrication.placement import PlacedPieces
-from ..geometry.triangles import TriangleSurface
 from ..kit.kinds import PartKind, part_kind
 from ..scene.scene import Scene
 from ..search.objective import Evaluation
@@ -170,10 +169,6 @@ class _Drawing:
         return self.pieces.design
 
     @cached_property
-    def surface(self) -> TriangleSurface:
-        return TriangleSurface(self.design.target.vertices, self.design.target.faces)
-
-    @cached_property
     def fitting(self) -> TargetFitting:
         return TargetFitting(self.design.target)
 
@@ -265,7 +260,7 @@ class _Drawing:
                 placement.apply(corners),
             )
             R = placement.rotation @ R
-            distances = np.sqrt(self.surface.closest(x).squared_distances)
+            distances = np.sqrt(self.design.target.surface.closest(x).squared_distances)
             deviation = 100 * distances[nodes] / self.design.target.size
         strength = design_strength(self.design, {role: equilibrium})[role]
         largest = strength.largest

@@ -23,7 +23,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..compiled.library import address, library
 from .rotations import bend_coefficients, hat, log_so3
 
 _I3 = np.eye(3)[None]
@@ -78,45 +77,6 @@ def evaluate(
         R0T, p, phi, s, A, (c, c_s, c_ss), p_x, phi_x, sigma if stress is None else stress
     )
     return energy, gradient, material + geometric, e, B
-
-
-def evaluate_compiled(
-    x0: np.ndarray,
-    R0: np.ndarray,
-    x1: np.ndarray,
-    R1: np.ndarray,
-    lengths: np.ndarray,
-    stiffness: np.ndarray,
-    rest_strain: np.ndarray,
-    stress: np.ndarray | None = None,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The same by the compiled kernel that scenes are assembled with.
-
-    Raises RuntimeError where there are no compiled kernels.
-    """
-    kernels = library()
-    if kernels is None:
-        raise RuntimeError("there are no compiled kernels")
-    n = len(lengths)
-    given = [
-        np.ascontiguousarray(a, float) for a in (x0, R0, x1, R1, lengths, stiffness, rest_strain)
-    ]
-    out = (
-        np.empty(n),
-        np.empty((n, 12)),
-        np.empty((n, 12, 12)),
-        np.empty((n, 6)),
-        np.empty((n, 6, 12)),
-    )
-    stress = None if stress is None else np.ascontiguousarray(stress, float)
-    shapes = ((n, 3), (n, 3, 3), (n, 3), (n, 3, 3), (n,), (n, 6), (n, 6))
-    kernels.evaluate_elements(
-        n,
-        *[address(array, np.float64, shape) for array, shape in zip(given, shapes)],
-        None if stress is None else address(stress, np.float64, (n, 6)),
-        *map(address, out),
-    )
-    return out
 
 
 def length_derivative(

@@ -1,13 +1,4 @@
-"""Loads: dead forces on points of bodies, moments on bodies and hinges, self-weight.
-
-A force that keeps its direction has a potential, -f.x. A moment on a body that may turn in space
-has none, neither one that keeps its direction nor one that turns with the body: the work depends on
-the path (Ziegler, Principles of Structural Stability). Their tangents are not symmetric. In
-increments R exp(hat(w)) the symmetric part, which the solver takes, is zero for both, and their
-skew parts are opposite; where the turns of the body stay in one plane it is the whole tangent. So
-equilibria are exact, iterations converge linearly where turns are spatial, and stability is that of
-the semi-tangential moment between the two.
-"""
+"""Loads: dead forces on points of bodies, torques on hinges, self-weight. All have a potential."""
 
 from __future__ import annotations
 
@@ -58,41 +49,6 @@ class DeadForces(SceneTerm):
             F[:, :, None] * o[:, None, :] + o[:, :, None] * F[:, None, :]
         )
         return self.energy(state), -np.concatenate([self.forces, np.cross(o, F)], axis=1), H
-
-
-class BodyMoments(SceneTerm):
-    """Moments that turn with their bodies. No potential; the symmetric part of the tangent is zero.
-
-    bodies : (m,)
-    moments : (m, 3) or (3,), body axes
-
-    Raises InputError where sizes don't fit or numbers are not finite.
-    """
-
-    conservative = False
-
-    def __init__(self, bodies: Any, moments: Any):
-        self.bodies = _numbers(bodies)
-        self.moments = _vectors(moments, len(self.bodies), "moments")
-        self.dofs = 6 * self.bodies[:, None] + np.arange(3, 6)
-
-    def energy(self, state: State) -> float:
-        """0: there is no potential."""
-        return 0.0
-
-    def gradient_hessian(self, state: State) -> tuple[float, np.ndarray, np.ndarray]:
-        """0, gradients (m, 3), minus the moments in body axes, and zero Hessians (m, 3, 3)."""
-        return 0.0, -self._in_body_axes(state), np.zeros((len(self.bodies), 3, 3))
-
-    def _in_body_axes(self, state: State) -> np.ndarray:
-        return self.moments
-
-
-class SpatialMoments(BodyMoments):
-    """Moments that keep their direction in space: the same with moments (m, 3) in global axes."""
-
-    def _in_body_axes(self, state: State) -> np.ndarray:
-        return np.einsum("mji,mj->mi", state.rotations[self.bodies], self.moments)
 
 
 class HingeTorques(SceneTerm):

@@ -10,9 +10,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from .qp_backends import (
+    QP,
     OsqpBackend,
     RawSolution,
-    ScaledQP,
     factorise_positive,
     is_indefinite,
     solve_direct,
@@ -22,26 +22,6 @@ from .qp_backends import (
 # of the largest; smaller diagonal entries of H do not set the scale of their variable
 _SMALLEST_DIAGONAL = 1e-12
 _INTERIOR = 1e-5  # of what is accepted: PIQP gains a digit with each of its last iterations
-
-
-@dataclass(frozen=True)
-class QP:
-    """min 1/2 x^T H x + g^T x with lo <= A x <= hi and lb <= x <= ub.
-
-    H : (n, n) sparse, symmetric with both triangles, positive semidefinite
-    g : (n,); A : (m, n) sparse; lo, hi : (m,); lb, ub : (n,), infinite where free
-    border : how many of the last unknowns couple otherwise uncoupled blocks of H; only speed
-        depends on it
-    """
-
-    H: sp.csc_matrix
-    g: np.ndarray
-    A: sp.csr_matrix
-    lo: np.ndarray
-    hi: np.ndarray
-    lb: np.ndarray
-    ub: np.ndarray
-    border: int = 0
 
 
 @dataclass(frozen=True)
@@ -147,7 +127,7 @@ class QPSolver:
 
     def _attempts(
         self,
-        qp: ScaledQP,
+        qp: QP,
         start: tuple[np.ndarray, np.ndarray, np.ndarray],
         interior_first: bool,
     ) -> tuple[RawSolution, Residuals, str]:
@@ -178,7 +158,7 @@ class QPSolver:
         return RawSolution(raw.x, raw.y, raw.z, status, raw.iterations), nothing, solver
 
 
-def residuals_of(qp: QP | ScaledQP, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> Residuals:
+def residuals_of(qp: QP, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> Residuals:
     """The relative residuals of a solution. Meant for the scaled QP, where gradient and curvature
     are of order 1."""
     curvature, push, row = qp.H @ x, qp.A.T @ y, qp.A @ x
@@ -191,7 +171,7 @@ def residuals_of(qp: QP | ScaledQP, x: np.ndarray, y: np.ndarray, z: np.ndarray)
     return Residuals(stationarity, feasibility, complementarity)
 
 
-def _without_void_multipliers(qp: ScaledQP, raw: RawSolution) -> RawSolution:
+def _without_void_multipliers(qp: QP, raw: RawSolution) -> RawSolution:
     """Multipliers of infinite limits set to zero: what rounding leaves there then shows up in the
     stationarity."""
 
@@ -244,7 +224,7 @@ class _Scaling:
         row = 1 / np.where(row > 0, row, 1.0)
         return cls(variable, row, _largest(variable * qp.g) or 1.0)
 
-    def apply(self, qp: QP) -> ScaledQP:
+    def apply(self, qp: QP) -> QP:
         unit = self.length * self.variable
         H, A = sp.csc_matrix(qp.H, copy=True), sp.csr_matrix(qp.A, copy=True)
         H.data *= self.variable[H.indices] * np.repeat(self.variable, np.diff(H.indptr))
@@ -252,9 +232,7 @@ class _Scaling:
         for matrix in (H, A):
             matrix.sort_indices()
         lo, hi = self.row * qp.lo / self.length, self.row * qp.hi / self.length
-        return ScaledQP(
-            H, unit * qp.g / self.length**2, A, lo, hi, qp.lb / unit, qp.ub / unit, qp.border
-        )
+        return QP(H, unit * qp.g / self.length**2, A, lo, hi, qp.lb / unit, qp.ub / unit, qp.border)
 
     def into(
         self, x: np.ndarray, y: np.ndarray, z: np.ndarray

@@ -36,8 +36,14 @@ _UNBOUNDED = (
 
 
 @dataclass(frozen=True)
-class ScaledQP:
-    """Matrices and vectors of the scaled QP; H with both triangles; border as in `QP`."""
+class QP:
+    """min 1/2 x^T H x + g^T x with lo <= A x <= hi and lb <= x <= ub.
+
+    H : (n, n) sparse, symmetric with both triangles, positive semidefinite
+    g : (n,); A : (m, n) sparse; lo, hi : (m,); lb, ub : (n,), infinite where free
+    border : how many of the last unknowns couple otherwise uncoupled blocks of H; only speed
+        depends on it
+    """
 
     H: sp.csc_matrix
     g: np.ndarray
@@ -143,7 +149,7 @@ def is_indefinite(matrix: sp.csc_matrix, border: int = 0) -> bool:
     return factorise_positive(shifted, border) is None
 
 
-def solve_direct(qp: ScaledQP, solve: Callable[[np.ndarray], np.ndarray]) -> RawSolution | None:
+def solve_direct(qp: QP, solve: Callable[[np.ndarray], np.ndarray]) -> RawSolution | None:
     """The unconstrained minimiser, if no limit cuts it off: then it solves the QP. ``solve`` is
     H^-1."""
     x = solve(-qp.g)
@@ -184,7 +190,7 @@ class OsqpBackend:
         self._rho_moved = False
         self.setups = 0
 
-    def solve(self, qp: ScaledQP, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> RawSolution:
+    def solve(self, qp: QP, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> RawSolution:
         """Solve from the warm start (x, y, z)."""
         limited = np.flatnonzero(np.isfinite(qp.lb) | np.isfinite(qp.ub))
         upper = sp.triu(qp.H, format="csc")
@@ -271,7 +277,7 @@ def _unpack(result: Any, limited: np.ndarray, m: int, n: int) -> RawSolution:
     return RawSolution(x, dual[:m], z, status, int(result.info.iter))
 
 
-def solve_piqp(qp: ScaledQP, eps: float, max_iterations: int) -> RawSolution:
+def solve_piqp(qp: QP, eps: float, max_iterations: int) -> RawSolution:
     """PIQP, an interior-point method: accurate, in a dozen iterations, where a first-order method
     stalls. Where most of H is filled, its dense solver is seven times faster (492 unknowns)."""
     dense = qp.H.nnz > _FILLED * qp.g.size**2

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..arrays import Indices, Parameters, Points, Triangles, Vector
 from ..errors import InputError, did_you_mean
+from ..geometry.triangles import TriangleSurface
 from ..kit.groups import ElementGroup
 from ..plugins import Registry
 from ..units import Units, units_from_dict
@@ -51,6 +52,12 @@ class Target:
     faces: Triangles
     positions: Points
     size: float
+
+    @cached_property
+    def surface(self) -> TriangleSurface:
+        """The surface with its search tree, which everything that measures distances from this
+        target shares."""
+        return TriangleSurface(self.vertices, self.faces)
 
 
 @dataclass(frozen=True)
@@ -169,6 +176,12 @@ class Design(ABC):
     def hardware(self) -> CellHardware | None:
         """Arms and plates, of classes whose parts are cells; None of others."""
         return None
+
+    @property
+    def cautions(self) -> list[str]:
+        """What else to know of the design before a kit is sought for it, in words, as `kop check`
+        prints them."""
+        return []
 
     @property
     def fitted_role(self) -> Role:

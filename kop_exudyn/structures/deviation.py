@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from ..geometry.triangles import TriangleSurface
 from ..scene.state import State
 from .base import Design, Target
 from .fitting import FitResult
@@ -51,10 +50,7 @@ def deviation(design: Design, target: Target, fit: FitResult, state: State) -> D
     """
     distances = fit.distances
     if not design.beside_target:
-        points = rod_points(design, state)
-        closest = TriangleSurface(target.vertices, target.faces).closest(
-            fit.placement.apply(points)
-        )
+        closest = target.surface.closest(fit.placement.apply(rod_points(design, state)))
         distances = np.concatenate([distances, np.sqrt(closest.squared_distances)])
     return Deviation(fit.distances, distances, fit.size)
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from ..checks import check_positive
 from ..errors import InputError
-from ..geometry.triangles import Closest, TriangleSurface
-from ..rods.rotations import exp_so3
+from ..geometry.triangles import Closest
+from ..rods.rotations import exp_so3, hat
 from .base import Target
 
 _MAX_ITERATIONS = 100
@@ -119,7 +119,7 @@ class TargetFitting:
             raise InputError("must lie in [0, 1]", field="share", value=share)
         if level is not None:
             check_positive("level", level)
-        self.surface = TriangleSurface(target.vertices, target.faces)
+        self.surface = target.surface
         self.positions = np.asarray(target.positions, dtype=float)
         if (
             self.positions.ndim != 2
@@ -190,7 +190,7 @@ class TargetFitting:
         centre = self.weights @ y
         arms = y - centre
         size = float(np.sqrt(self.weights @ np.sum(arms**2, axis=1))) or self.size
-        turns = np.cross(np.eye(3)[None], arms[:, None]) / size  # (n, axis, 3)
+        turns = hat(arms) / size  # (n, axis, 3): row k is e_k x arm
         shifts = np.broadcast_to(np.eye(3), turns.shape)
         return (
             centre,

@@ -10,7 +10,6 @@ import numpy as np
 
 from ..errors import InputError
 from ..geometry.extent import size_of_points
-from ..geometry.mesh_files import read_mesh
 from ..geometry.triangles import TriangleSurface
 from .base import Target
 
@@ -28,6 +27,8 @@ def load_target_mesh(data: Mapping[str, Any], folder: Path) -> TriangleSurface:
 
     Raises InputError, naming the field "target.file", where it contains no usable mesh.
     """
+    from ..geometry.mesh_files import read_mesh
+
     path = folder / data["file"]
     vertices, faces = read_mesh(path, "target.file")
     axes = np.array(data.get("axes", np.eye(3)), float)

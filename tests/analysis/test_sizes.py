@@ -18,7 +18,14 @@ from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.search.stages import Stages
 
-STAGES = StageSettings(schedule=(1e3, 1e5), path_steps=4, leaps=0, effort="quick")
+STAGES = StageSettings(
+    schedule=(1e3, 1e5),
+    path_steps=4,
+    leaps=0,
+    effort="quick",
+    levelling=0,
+    requirements=Requirements(samples=2),
+)
 SETTINGS = JobSettings(jobs=1, stages=STAGES, baselines=False)
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.moments import BodyMoments, SpatialMoments
 
 from kop_exudyn.equilibrium.exudyn_confirm import confirm, model_of
 from kop_exudyn.equilibrium.exudyn_model import ExudynModel
@@ -16,7 +17,7 @@ from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.rods.rotations import exp_so3
 from kop_exudyn.scene.actuators import LinearActuators
 from kop_exudyn.scene.builder import SceneBuilder
-from kop_exudyn.scene.loads import BodyMoments, DeadForces, SpatialMoments
+from kop_exudyn.scene.loads import DeadForces
 from kop_exudyn.scene.state import State
 
 

@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.moments import SpatialMoments
 
 from kop_exudyn.equilibrium.newton import NewtonOptions, refine, solve
 from kop_exudyn.equilibrium.sensitivities import Sensitivities
 from kop_exudyn.equilibrium.system import System
 from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.rods.rotations import exp_so3
-from kop_exudyn.scene.loads import DeadForces, SpatialMoments
+from kop_exudyn.scene.loads import DeadForces
 
 EULER = np.pi**2 / 4  # of the strut, about y
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support.moments import SpatialMoments
 from support.states import increment
 
 from kop_exudyn.equilibrium.newton import NewtonOptions, refine, solve
 from kop_exudyn.equilibrium.sensitivities import Sensitivities
 from kop_exudyn.equilibrium.system import System
-from kop_exudyn.scene.loads import SpatialMoments
 
 EXACT = NewtonOptions(tolerance=1e-12)
 CASES = [

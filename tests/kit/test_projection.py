@@ -67,9 +67,20 @@ def test_minimised_energy_has_the_gradient_and_reduced_hessian(problem):
     assert max(second) < 1e-12 * best.energy + 1e-6 * min(first)  # quadratic for a fixed assignment
 
 
+def part_gradient(projection, q, kit, assignment):
+    """(n_p,) derivative in the parts. The energy is quadratic in them as long as no element comes
+    to the end of an interval: central differences are exact but for rounding."""
+    p, h = kit.vector, 1e-3
+    sides = (
+        [projection.energy(q, kit.with_vector(p + s * e), assignment) for s in (h, -h)]
+        for e in np.eye(len(p))
+    )
+    return np.array([(ahead - back) / (2 * h) for ahead, back in sides])
+
+
 def test_gradient_in_the_parts_vanishes_at_the_minimum(problem):
     projection, best = problem
-    gradient = projection.part_gradient(Q, best.kit, best.assignment)
+    gradient = part_gradient(projection, Q, best.kit, best.assignment)
     lower, _ = best.kit.bounds()
     assert np.abs(gradient[best.kit.vector > lower]).max() < 1e-9
     assert np.all(gradient > -1e-9)
@@ -88,7 +99,7 @@ def test_lifted_hessian_is_exact(problem):
         np.concatenate(
             [
                 projection.gradient(q, parts, assignment),
-                projection.part_gradient(q, parts, assignment),
+                part_gradient(projection, q, parts, assignment),
             ]
         )
         for q, parts in ((Q, kit), (Q + dq, other))

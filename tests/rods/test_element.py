@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.elements import evaluate_compiled
 
 from kop_exudyn.compiled.library import library
 from kop_exudyn.rods import element
@@ -57,7 +58,7 @@ def form(request):
     """Both forms of the element, for all tests."""
     if request.param == "compiled" and library() is None:
         pytest.skip("there are no compiled kernels")
-    forms = {"compiled": element.evaluate_compiled, "numpy": element.evaluate}
+    forms = {"compiled": evaluate_compiled, "numpy": element.evaluate}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Elements, "form", staticmethod(forms[request.param]))
         yield
@@ -96,7 +97,7 @@ def test_compiled_and_numpy_forms_agree(curved, mixed):
         elements.gamma,
     )
     for compiled, plain in zip(
-        element.evaluate_compiled(*given, stress), element.evaluate(*given, stress=stress)
+        evaluate_compiled(*given, stress), element.evaluate(*given, stress=stress)
     ):
         assert largest_relative(compiled, plain) < 1e-12
 

@@ -6,6 +6,7 @@ import exudyn as exu
 import exudyn.itemInterface as item
 import numpy as np
 import pytest
+from support.elements import evaluate_compiled
 
 from kop_exudyn.rods import element
 from kop_exudyn.rods.rotations import exp_se3, exp_so3, log_so3
@@ -68,6 +69,6 @@ def test_gradient_is_minus_exudyns_residual(curvature):
         x1 = x0 + R0 @ (L * np.array([1.0, 0, 0]) + 0.1 * rng.normal(size=3))
         exudyn = beam.forces(x0, R0, x1, R1)
         arguments = (x0[None], R0[None], x1[None], R1[None], np.array([L]), K[None], gamma[None])
-        for form in (element.evaluate, element.evaluate_compiled):
+        for form in (element.evaluate, evaluate_compiled):
             gradient = form(*arguments)[1][0]
             assert np.abs(gradient + exudyn).max() < 1e-12 * np.abs(exudyn).max()

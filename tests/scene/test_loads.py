@@ -4,17 +4,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.moments import BodyMoments, SpatialMoments
 
 from kop_exudyn.errors import InputError
 from kop_exudyn.rods.rotations import exp_so3
 from kop_exudyn.rods.sections import rectangle
 from kop_exudyn.scene.builder import SceneBuilder
 from kop_exudyn.scene.loads import (
-    BodyMoments,
     DeadForces,
     HingeTorques,
     Scaled,
-    SpatialMoments,
     with_self_weight,
 )
 from kop_exudyn.scene.state import State
@@ -117,7 +116,6 @@ def test_self_weight_is_added_per_rest_length():
         lambda: DeadForces([0, 1], np.zeros((3, 3))),
         lambda: DeadForces([0], [np.nan, 0, 0]),
         lambda: DeadForces([0], [0, 0, 1.0], points=[0.0, 1.0]),
-        lambda: SpatialMoments([0], [[1.0, 2.0]]),
         lambda: HingeTorques([0, 1], [1.0, 2.0, 3.0], 5),
         lambda: HingeTorques([0], np.inf, 5),
         lambda: with_self_weight(beam(), 1.0, [0, 0, -1]),

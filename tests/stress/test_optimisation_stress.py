@@ -185,7 +185,6 @@ class TestWorkers:
             ),
         )
         undisturbed = fingerprint(optimize_kit(designs, {"linear": 2}, settings=settings))
-        monkeypatch.setattr(pool, "_run_task", _slow_task)
         batches, kills = [], []
         original = pool.DesignPool._run
 
@@ -195,7 +194,9 @@ class TestWorkers:
                 killer = threading.Timer(0.1, _kill_a_worker, [kills])
                 killer.start()
                 try:
-                    return original(self, tasks)
+                    with monkeypatch.context() as patch:
+                        patch.setattr(pool, "_run_task", _slow_task)
+                        return original(self, tasks)
                 finally:
                     killer.join()
             return original(self, tasks)

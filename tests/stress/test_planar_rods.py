@@ -7,12 +7,13 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
+from support.moments import SpatialMoments
 
 from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.equilibrium.sensitivities import Sensitivities
 from kop_exudyn.equilibrium.system import System
 from kop_exudyn.scene.builder import SceneBuilder
-from kop_exudyn.scene.loads import DeadForces, SpatialMoments
+from kop_exudyn.scene.loads import DeadForces
 
 EI, LENGTH = 2.0, 1.0
 STIFF = 1e6  # stretch and shear: next to inextensible, as the classical elastica

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.moments import BodyMoments
 
 from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.equilibrium.system import System
@@ -16,7 +17,7 @@ from kop_exudyn.rods.sections import (
     section_from_dict,
 )
 from kop_exudyn.scene.builder import SceneBuilder
-from kop_exudyn.scene.loads import BodyMoments, DeadForces
+from kop_exudyn.scene.loads import DeadForces
 from kop_exudyn.structures.base import design_from_dict
 from kop_exudyn.structures.strength import (
     design_strength,

@@ -1,3 +1,3 @@
-"""Orthogonal grids and C-meshes: lamellas on surfaces, joined at right angles to them."""
+"""Orthogonal grids: lamellas on surfaces, joined at right angles to them."""
 
-from . import c_mesh, design  # noqa: F401  # register the classes
+from . import design  # noqa: F401  # registers the class

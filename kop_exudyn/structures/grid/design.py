@@ -125,6 +125,20 @@ class Grid(Design):
     def file_with(self, data: Mapping[str, Any], q: np.ndarray) -> dict[str, Any]:
         return {**data, "straightened": self.straight.numbering.split(q)}
 
+    @property
+    def cautions(self) -> list[str]:
+        """That nothing holds a net which can collapse."""
+        from .c_mesh import c_mesh_residuals
+
+        joints, lamellas = self.network.joints, self.straight.lamellas
+        free = self.held is None and c_mesh_residuals(self.surface, joints, lamellas).collapses
+        told = (
+            "its curves are close to a Chebyshev net on a surface of constant curvature, which can "
+            'collapse to a flat strip: it may shear with little resistance; joints in the field "'
+            'held" (kop import --held) stop that'
+        )
+        return [told] if free else []
+
     @cached_property
     def target(self) -> Target:
         """The design surface around the grid, finely triangulated; positions: the joints on it, as

@@ -288,12 +288,6 @@ class Umbrella(Design):
         """Distance (n_cells,) of the two plates of every cell."""
         return self.model.actuators.spacings(state)
 
-    def with_lengths(self, lengths: np.ndarray) -> Umbrella:
-        """The same design with other arm lengths (n_cells, 2) as its input."""
-        lengths = np.array(lengths, float).reshape(-1, 2)
-        positions = self.mesh.compact_positions(lengths.ravel())
-        return self._like(replace(self.mesh, lengths=lengths, positions=positions))
-
     def with_plates(self, plate_model: str, young: float | None = None) -> Umbrella:
         """The same design with its plates modelled as "rods", perhaps of another modulus, or
         "rigid"."""
