@@ -12,6 +12,7 @@ FOLDERS = (
     "plugins",
     "provenance",
     "units",
+    "wording",
     "compiled",
     "geometry",
     "sqp",

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..units import Units, common_units, in_millimetres, plain_number, unit_of
+from ..wording import counted, counted_parts
 from .options import add_designs, add_selection
 from .output import add_json, report
 from .values import number_pair, part_counts
@@ -114,8 +115,7 @@ def _harmonised(
 
 
 def _text(checks: list[DesignCheck], parts: Mapping[str, int], units: Units | None) -> str:
-    kit = " and ".join(f"{count} {kind}" for kind, count in parts.items())
-    lines = [f"{len(checks)} designs, compared by a kit of {kit} parts"]
+    lines = [f"{counted(len(checks), 'design')}, compared by a kit of {counted_parts(parts)}"]
     for check in checks:
         lines.append(f"\n{check.name}")
         if check.failed is None:

@@ -8,6 +8,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..wording import counted
 from .options import add_run_or_design
 from .output import add_json, report
 from .values import not_negative_number, number_list, number_pair, positive_number
@@ -95,7 +96,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     done, notes = _kit(args) if os.path.isdir(args.what) else (_design(args), [])
-    text = "".join(f"{line}\n" for line in [*notes, f"{len(done)} files in {args.out}"])
+    text = "".join(f"{line}\n" for line in [*notes, f"{counted(len(done), 'file')} in {args.out}"])
     report(args, {"folder": args.out, "files": done, "notes": notes}, text)
     return 0
 
@@ -140,7 +141,7 @@ def _kit(args: argparse.Namespace) -> tuple[list[Path], list[str]]:
             options=options,
             tolerances=tolerances,
             paper=args.paper,
-            title=f"Kit of {len(parts.designs)} designs: {args.what.resolve().name}",
+            title=f"Kit of {counted(len(parts.designs), 'design')}: {args.what.resolve().name}",
             force=args.force,
             overwrite=args.overwrite,
         )

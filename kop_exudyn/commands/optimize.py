@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..wording import counted_parts
 from .options import add_cost, add_designs, add_processes, add_results, add_selection
 from .output import add_json, report
 from .values import (
@@ -335,8 +336,7 @@ def _smallest(args: argparse.Namespace, study: Study, parts: dict[str, int]) -> 
             "warnings": list(chosen.result.warnings),
             **row,
         },
-        _lines(chosen.result, page)
-        + f"{', '.join(f'{n} {kind}' for kind, n in chosen.sizes.items())} parts, largest "
+        _lines(chosen.result, page) + f"{counted_parts(chosen.sizes)}, largest "
         f"deviation {chosen.max_percent:.3g} %\n",
     )
     if not kept:

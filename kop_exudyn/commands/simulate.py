@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..wording import counted
 from .output import add_json
 from .values import gravity
 
@@ -135,16 +136,18 @@ def _summary(result: dict, units: Units | None) -> str:
     exudyn, fit = result["exudyn"], result["fit"]
     rows = {
         "design": result["design"],
-        "model": f"{result['elements']:,} elements, {result['unknowns']:,} unknowns",
+        "model": f"{counted(result['elements'], 'element')}, "
+        f"{counted(result['unknowns'], 'unknown')}",
         "deviation": f"max {fit['max_percent']:.3g} %, mean {fit['mean_percent']:.3g} % "
         f"of the target's size; max {with_unit(fit['max'], 'length', units, 3)}"
         + (" (kop fit may lower it)" if fit["max_percent"] > OFF_TARGET else ""),
         "displacement": f"max {result['displaced_percent']:.3g} % from the joints' own places",
         "elastic energy": with_unit(result["elastic_energy"], "energy", units, 6),
         "stable": "yes" if result["stable"] else "no",
-        "solved in": f"{result['wall_s']:.2f} s, {result['newton_iterations']} Newton iterations"
+        "solved in": f"{result['wall_s']:.2f} s, "
+        f"{counted(result['newton_iterations'], 'Newton iteration')}"
         + (" by Exudyn" if result["engine"] == "exudyn" else ""),
-        "Exudyn": f"{exudyn['version']}: {exudyn['newton_steps']} steps, "
+        "Exudyn": f"{exudyn['version']}: {counted(exudyn['newton_steps'], 'step')}, "
         f"moved by {exudyn['moved']:.1e} of its size",
     }
     if fit["pieces_max"] != fit["max"]:
@@ -178,7 +181,7 @@ def _limits(limits: dict) -> str:
     """How many joints touch their limits."""
     furthest = math.degrees(limits["furthest"])
     beyond = f", the furthest {furthest:.2g}° beyond" if furthest > 0 else ""
-    return f"touched by {limits['touched']} of {limits['hinges']} joints{beyond}"
+    return f"touched by {limits['touched']} of {counted(limits['hinges'], 'joint')}{beyond}"
 
 
 def _under_load(loaded: dict, units: Units | None) -> dict[str, str]:
@@ -197,7 +200,7 @@ def _under_load(loaded: dict, units: Units | None) -> dict[str, str]:
         else {"reactions": f"{with_unit(worst, 'force', units, 4)} at the support with the most"}
     )
     return {
-        "load": f"{force} in all, held at {len(loaded['supports'])} joints",
+        "load": f"{force} in all, held at {counted(len(loaded['supports']), 'joint')}",
         **reactions,
         "deflection": f"max {largest} ({deflection['max_percent']:.3g} % of the size), "
         f"mean {mean} ({deflection['mean_percent']:.3g} %)",

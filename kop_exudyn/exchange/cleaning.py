@@ -15,6 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ..wording import counted
 from .drawing import DrawnCurve, Finding
 
 TOLERANCE = 2e-4  # of the drawing's size
@@ -40,7 +41,8 @@ def cleaned(
             continue
         lost = len(curve.points) - len(found.points) - (found.closed and not curve.closed)
         if lost:
-            findings.append(Finding("cleaned", f"{lost} repeated points left out of {curve.label}"))
+            text = f"{counted(lost, 'repeated point')} left out of {curve.label}"
+            findings.append(Finding("cleaned", text))
         kept.append(found)
     kept, doubles = _without_doubles(kept, tolerance)
     kept, gaps = _ends_together(kept, tolerance)
@@ -52,8 +54,8 @@ def _in_sum(findings: Sequence[Finding]) -> list[Finding]:
     points = [f for f in findings if f.kind == "cleaned"]
     if len(points) <= _TOLD:
         return list(findings)
-    total = sum(int(f.text.split()[0]) for f in points)
-    text = f"{total} repeated points left out of {len(points)} curves"
+    total = sum(int(f.text.split()[0].replace(",", "")) for f in points)
+    text = f"{counted(total, 'repeated point')} left out of {counted(len(points), 'curve')}"
     return [f for f in findings if f.kind != "cleaned"] + [Finding("cleaned", text)]
 
 
@@ -171,5 +173,5 @@ def _ends_together(
     found = [replace(curve, points=moved[k]) for k, curve in enumerate(curves)]
     if not places:
         return found, []
-    text = f"ends brought together at {len(places)} places, by {gap:.3g} at most"
+    text = f"ends brought together at {counted(len(places), 'place')}, by {gap:.3g} at most"
     return found, [Finding("cleaned", text, np.array(places))]

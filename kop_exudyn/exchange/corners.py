@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..wording import counted
 from .drawing import DrawnCurve, Finding
 from .outlines import place_of
 
@@ -43,8 +44,9 @@ def split_at_corners(
         return list(curves), list(flat), []
     found = np.concatenate(places)
     text = (
-        f"{len(places)} curves are taken for several laths, which end at {len(found)} sharp "
-        f"corners, such as {label} (--curves polyline keeps corners in one lath)"
+        f"{counted(len(places), 'curve is', 'curves are')} taken for several laths, which end at "
+        f"{counted(len(found), 'sharp corner')}, such as {label} (--curves polyline "
+        "keeps corners in one lath)"
     )
     return kept, plan, [Finding("suspicious", text, found)]
 
@@ -79,7 +81,8 @@ def rounded_corners(curves: Sequence[DrawnCurve]) -> list[Finding]:
     if worst is None:
         return []
     text = (
-        f"{len(places)} curves have corners that smooth curves through their points round off, "
+        f"{counted(len(places), 'curve has', 'curves have')} corners that smooth curves "
+        "through their points round off, "
         f"{worst.label} by up to {largest:.3g} (--curves polyline keeps corners)"
     )
     return [Finding("suspicious", text, np.array(places))]

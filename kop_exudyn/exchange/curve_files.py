@@ -14,6 +14,7 @@ from ..files.files import read_bytes
 from ..geometry.nurbs import spline_points
 from ..geometry.obj_files import ObjContent, parse_obj
 from ..units import LENGTHS
+from ..wording import counted
 from .drawing import SAG, Drawing, DrawnCurve
 from .dxf_curves import dxf_drawing
 from .other_formats import is_really
@@ -98,9 +99,13 @@ def _obj_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
         points = found.vertices[picked[: len(picked) - closed]]
         curves.append(DrawnCurve(points, closed, f"line {line}"))
     curves += _free_forms(found)
-    skipped = [f"{n} {name} elements" for name, n in found.left_out.items()]
+    skipped = [counted(n, f"{name} element") for name, n in found.left_out.items()]
     if found.faces:
-        skipped.append(f"{len(found.faces)} faces, which are a surface's: --edges reads them")
+        skipped.append(
+            f"{counted(len(found.faces), 'face, which is', 'faces, which are')} a "
+            "surface's: --edges "
+            "reads them"
+        )
     unit = said_unit(content)
     return Drawing(curves, unit, None if unit is None else LENGTHS[unit], skipped)
 

@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..geometry.centring import middle_of
 from ..geometry.curves import Curve, curve_from_dict
 from ..geometry.network import CurveNetwork, network
+from ..wording import counted
 from .cleaning import TOLERANCE, cleaned
 from .contacts import EndContact, crossing_pieces, end_contacts
 from .corners import rounded_corners, split_at_corners
@@ -256,10 +257,12 @@ def _about_joins(joined: Any) -> list[Finding]:
     """What was joined and what was hinged, in words."""
     found = []
     if len(joined.seams):
-        text = f"{len(joined.seams)} seams joined: pieces that go on in each other"
+        text = f"{counted(len(joined.seams), 'seam')} joined: pieces that go on in each other"
         found.append(Finding("joined", text, joined.seams))
     if len(joined.tips):
-        text = f"{len(joined.tips)} tips hinged: ends that meet and are of different curves"
+        text = (
+            f"{counted(len(joined.tips), 'tip')} hinged: ends that meet and are of different curves"
+        )
         found.append(Finding("hinged", text, joined.tips))
     if len(joined.by_turn):
         text = (
@@ -269,7 +272,8 @@ def _about_joins(joined: Any) -> list[Finding]:
         found.append(Finding("suspicious", text, joined.by_turn))
     if len(joined.crowded):
         text = (
-            f"more than four ends of curves meet at {len(joined.crowded)} places, such as "
+            "more than four ends of curves meet at "
+            f"{counted(len(joined.crowded), 'place')}, such as "
             f"{place_of(joined.crowded[0])}: a joint holds two laths, of which at most four ends "
             "meet"
         )
@@ -312,7 +316,9 @@ def _ends_on_curves(
             near.append(contact)
     found = []
     if moved:
-        text = f"{len(moved)} ends brought onto the curves beside them, by {largest:.3g} at most"
+        text = (
+            f"{counted(len(moved), 'end')} brought onto the curves beside, by {largest:.3g} at most"
+        )
         found.append(Finding("cleaned", text, np.array(moved)))
     found += _missed(curves, [c for c in near if (c.curve, c.end) not in reached])
     return [replace(curve, points=x) for curve, x in zip(curves, points)], found

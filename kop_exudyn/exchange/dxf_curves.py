@@ -18,6 +18,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..fabrication.dxf import load_ezdxf
+from ..wording import counted
 from .drawing import Drawing
 from .dxf_clips import Clip, clip_of, shown
 from .dxf_outlines import outline_of
@@ -128,7 +129,7 @@ def dxf_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
         skipped.append("no curves: " + ", ".join(f"{n} {name}" for name, n in others.items()))
     empty = sum(outline is None for outline, _ in drawn)
     if empty:
-        skipped.append(f"{empty} curves of a single point")
+        skipped.append(f"{counted(empty, 'curve')} of a single point")
     if not _END.search(content):
         doubts.append("the file has no end (EOF): it may be cut off, and curves missing")
     if not entities:
@@ -178,14 +179,18 @@ def _document(ezdxf: Any, content: bytes) -> tuple[Any, list[str]]:
     lost = [fix.message for fix in auditor.fixes if AuditError(fix.code).name.startswith(_LOST)]
     if not lost:
         return document, []
-    return document, [f"{len(lost)} damaged entities are left out: {lost[0].rstrip('.')}"]
+    return document, [
+        f"{counted(len(lost), 'damaged entity is', 'damaged entities are')} left out: "
+        f"{lost[0].rstrip('.')}"
+    ]
 
 
 def _on_paper(document: Any) -> list[str]:
     """What is drawn on sheets, in words."""
     counts = {layout.name: len(layout) for layout in document.layouts if not layout.is_modelspace}
     return [
-        f"{n} entities on the sheet {name}: draw the net in model space, at its own size"
+        f"{counted(n, 'entity', 'entities')} on the sheet {name}: draw the net in model "
+        "space, at its own size"
         for name, n in counts.items()
         if n
     ]

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..units import Units, plain_number, with_unit
+from ..wording import counted
 from .drawing import Finding
 from .drawn_networks import DrawnNetwork, network_summary
 
@@ -42,7 +43,7 @@ def import_rows(
     opening : rad, of a C-shell
     """
     of = "of" if figures["curves"] <= figures["pieces"] else "made of"
-    rows = [("curves", f"{figures['curves']} {of} {figures['pieces']} drawn pieces")]
+    rows = [("curves", f"{figures['curves']} {of} {counted(figures['pieces'], 'drawn piece')}")]
     if "joints" in figures:
         rows.append(("joints", str(figures["joints"])))
         if figures["spans"]:

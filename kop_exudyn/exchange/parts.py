@@ -10,6 +10,7 @@ import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from ..wording import counted
 from .contacts import plan_lines
 from .drawing import DrawnCurve, Finding
 
@@ -43,7 +44,8 @@ def largest_part(
     kept = parts[0]
     out = sorted(k for part in parts[1:] for k in part)
     text = (
-        f"{len(out)} curves that aren't connected with the largest part, of {len(kept)}: "
+        f"{counted(len(out), 'curve is not', 'curves are not')} connected with the largest part, "
+        f"of {len(kept)}: "
         f"{_listed([curves[k].label for k in out])}"
     )
     places = np.array([curves[k].points.mean(axis=0) for k in out])
@@ -65,7 +67,7 @@ def advice(
             f"the parts have {sizes}{more} curves: do all laths meet others (--tolerance)? "
             "--largest-part reads the first of these parts alone"
         )
-    text = f"{len(parts[0])} of {len(curves)} curves hang together"
+    text = f"{len(parts[0])} of {counted(len(curves), 'curve')} hang together"
     first = {curves[k].layer for k in parts[0]} - {None}
     rest = {curves[k].layer for part in parts[1:] for k in part}
     if first and not first & rest:

@@ -14,6 +14,7 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
+from ..wording import counted
 from .cleaning import end_groups
 from .drawing import DrawnCurve, Finding
 
@@ -56,8 +57,8 @@ def axes_of_strips(
     if not widths:
         return list(curves), list(flat), []
     text = (
-        f"{len(widths)} closed curves are long and narrow, such as {label}: taken for outlines of "
-        f"laths, {_between(widths)} wide, and read as their axes"
+        f"{counted(len(widths), 'closed curve is', 'closed curves are')} long and narrow, such as "
+        f"{label}: taken for outlines of laths, {_between(widths)} wide, and read as their axes"
     )
     return kept, plan, [Finding("suspicious", text, np.array(places))]
 

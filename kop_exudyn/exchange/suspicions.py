@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 
 from ..errors import InputError
+from ..wording import counted
 from .drawing import DrawnCurve, Finding
 from .outlines import place_of
 from .strips import is_narrow
@@ -51,7 +52,8 @@ def without_bolts(
     if not bolts:
         return list(curves), list(flat), []
     text = (
-        f"{len(bolts)} small loops around places where two curves cross, as bolts and holes are "
+        f"{counted(len(bolts), 'small loop')} around places where two curves cross, as "
+        "bolts and holes are "
         f"drawn, such as {curves[bolts[0]].label}"
     )
     found = Finding("skipped", text, np.array([curves[k].points.mean(axis=0) for k in bolts]))
@@ -70,8 +72,8 @@ def narrow_loops(curves: Sequence[DrawnCurve], flat: Sequence[np.ndarray]) -> li
     if not found:
         return []
     text = (
-        f"{len(found)} closed curves are long and narrow, such as {found[0].label}: if they are "
-        "outlines of laths, draw the laths' axes instead"
+        f"{counted(len(found), 'closed curve is', 'closed curves are')} long and narrow, such as "
+        f"{found[0].label}: where that is the outline of a lath, draw the lath's axis instead"
     )
     return [Finding("suspicious", text, np.array([c.points.mean(axis=0) for c in found]))]
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..wording import counted
 from .blanks import Blanks
 from .options import NOTE_ROOM, CutOptions
 from .shapes import NOTES, Polyline, Shape, Template, Text, rectangle
@@ -149,6 +150,6 @@ def _sheet(
 def _caption(template: Template) -> Text:
     """The part's dimensions and how often it is needed, below it."""
     low, high = template.box
-    text = f"{template.label}: {template.name}, {template.count} pieces"
+    text = f"{template.label}: {template.name}, {counted(template.count, 'piece')}"
     height = min(4.0, 1.2 * (high - low)[0] / len(text))
     return Text(np.array([(low[0] + high[0]) / 2, low[1] - height]), height, text, NOTES)

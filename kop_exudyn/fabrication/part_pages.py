@@ -9,6 +9,7 @@ import numpy as np
 
 from ..drawing.labels import text_extent
 from ..drawing.style import FAINT, INK, QUIET
+from ..wording import counted
 from .blanks import Blanks, CornerPlate, Strip
 from .cutsheets import Sheet
 from .paper import Book, Page, fitting_scale
@@ -87,7 +88,8 @@ def plate_pages(book: Book, blanks: Blanks) -> None:
             page.text(
                 corner[0] + cell[0] / 2,
                 corner[1] + 2.5,
-                f"{plate.count} pieces; the second axis ends {_aside(angled)} mm off the first",
+                f"{counted(plate.count, 'piece')}; the second axis ends "
+                f"{_aside(angled)} mm off the first",
                 7,
                 ha="center",
                 va="center",
@@ -119,7 +121,7 @@ def cell_pages(book: Book, blanks: Blanks) -> None:
             below = at[1] - height
         middle = at + [width / 2, -template.size[1] / scale / 2]
         _template(page, template, middle - np.mean(template.box, axis=0) / scale, scale)
-        text = f"{template.label}: {template.count} pieces"
+        text = f"{template.label}: {counted(template.count, 'piece')}"
         under = at[1] - template.size[1] / scale - 3.0
         page.text(middle[0], under, text, 7, ha="center", va="center", weight="bold")
         page.text(middle[0], under - 3.5, template.name.split(",")[0], 6, ha="center", va="center")
@@ -158,7 +160,7 @@ def stock_pages(book: Book, blanks: Blanks, plan: StockPlan | None) -> None:
             page.text(
                 page.low[0],
                 page.high[1],
-                f"{len(plan.bars)} bars, {plan.length / 1000:.2f} m in all, "
+                f"{counted(len(plan.bars), 'bar')}, {plan.length / 1000:.2f} m in all, "
                 f"{100 * plan.used:.0f} % of it used; no plan needs less than "
                 f"{plan.least / 1000:.2f} m. "
                 f"Kerf {blanks.options.kerf:g} mm. Saw from the left; lengths in mm.",
@@ -250,7 +252,7 @@ def _strip(page: Page, strip: Strip, at: np.ndarray, scale: float) -> None:
     page.text(
         at[0] + 14.0,
         top + 2.0,
-        f"{strip.count} pieces, {strip.board.section} mm: "
+        f"{counted(strip.count, 'piece')}, {strip.board.section} mm: "
         f"{strip.cut_length:.1f} long, {joint}, bolt holes {strip.bolt_hole:g} mm{adapts}",
         8,
     )

@@ -14,6 +14,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import InputError
+from ..wording import counted
 from .network import CurveNetwork
 
 _FREE = 1e-12  # of the largest eigenvalue of the constraints: round-off in the joints' places
@@ -85,4 +86,4 @@ def _smallest_motion(turns: np.ndarray) -> np.ndarray:
 
 def _places(points: np.ndarray) -> str:
     shown = ", ".join(f"({x:.6g}, {y:.6g})" for x, y in points[:3])
-    return shown + (f" and {len(points) - 3} joints more" if len(points) > 3 else "")
+    return shown + (f" and {counted(len(points) - 3, 'joint')} more" if len(points) > 3 else "")

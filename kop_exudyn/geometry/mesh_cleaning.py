@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 
 from ..checks import LARGEST
 from ..errors import InputError
+from ..wording import counted
 
 WELD = 1e-6  # of the size: vertices this near to each other are one
 _MOST_CUTS = 1000  # faces beside empty ones; of more, the empty ones are only left out
@@ -51,16 +52,22 @@ def cleaned(
     size = float(np.linalg.norm(np.ptp(vertices[used], axis=0))) if len(used) else 0.0
     places, faces = welded(vertices, faces, tolerance * size)
     if len(places) < len(used):
-        notes.append(f"{len(used):,} corners welded into {len(places):,} vertices")
+        notes.append(
+            f"{counted(len(used), 'corner')} welded into "
+            f"{counted(len(places), 'vertex', 'vertices')}"
+        )
     faces, split = without_empty(places, faces)
     if split:
-        notes.append(f"{split} faces without area left out")
+        notes.append(f"{counted(split, 'face')} without area left out")
     _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
     if len(first) < len(faces):
-        notes.append(f"{len(faces) - len(first)} faces that are there twice left out")
+        notes.append(
+            f"{counted(len(faces) - len(first), 'face that is', 'faces that are')} "
+            "there twice left out"
+        )
     faces, turned = turned_alike(faces[np.sort(first)])
     if turned:
-        notes.append(f"{turned} faces turned round, to face like the others")
+        notes.append(f"{counted(turned, 'face')} turned round, to face like the others")
     used, faces = np.unique(faces, return_inverse=True)
     return places[used], faces.reshape(-1, 3), notes
 

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from ..errors import InputError
+from ..wording import counted
 from .elements import KindElements, Labels, collect
 from .groups import ElementGroup
 from .parts import Assignment, Kit
@@ -74,7 +75,8 @@ def transport(
             continue  # the nearest ones suffice
         if counts.sum() < len(own):
             raise InputError(
-                f"the stock has {counts.sum()} {elements.kind.name} pieces for {len(own)} elements",
+                f"the stock has {counted(counts.sum(), f'{elements.kind.name} piece')} for "
+                f"{counted(len(own), 'element')}",
                 field=f"counts.{elements.kind.name}",
             )
         pieces = np.repeat(np.arange(len(parts)), np.minimum(counts, len(own)))

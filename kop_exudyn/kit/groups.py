@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..arrays import ElementIndices
+from ..wording import counted
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,7 @@ class ElementGroup:
 
     def __repr__(self) -> str:
         n, k = self.indices.shape
-        return f"<ElementGroup: {n} {self.kind} elements of {k} parameters>"
+        return f"<ElementGroup: {counted(n, f'{self.kind} element')} of {counted(k, 'parameter')}>"
 
     def shifted(self, offset: int) -> ElementGroup:
         """The same elements in a longer parameter vector (several designs after each other)."""

@@ -18,6 +18,7 @@ from ..exchange.drawing import Finding
 from ..exchange.drawn_networks import DrawnNetwork
 from ..geometry.network import CurveNetwork
 from ..units import Units, unit_of
+from ..wording import counted
 from .designs import project
 from .page import Page
 
@@ -48,7 +49,7 @@ def net_preview(
     rows : the summary, as `import_rows` gives it
     refused : why no design comes of it, where that is so
     """
-    lead = f"{len(drawn.entries)} curves were understood."
+    lead = f"{counted(len(drawn.entries), 'curve was', 'curves were')} understood."
     if refused is not None:
         lead = f"No design comes of this drawing: {refused}"
     page = Page(f"What was read of {name}", lead)
@@ -79,7 +80,9 @@ def net_preview(
 def umbrella_preview(name: str, data: Mapping[str, Any], rows: Sequence[tuple[str, str]]) -> Page:
     """The page of an umbrella mesh's design file: its base mesh, and the surface it is for."""
     unit = data["units"]["length"]
-    page = Page(f"What was read of {name}", f"An umbrella mesh of {len(data['lengths'])} cells.")
+    page = Page(
+        f"What was read of {name}", f"An umbrella mesh of {counted(len(data['lengths']), 'cell')}."
+    )
     page.table(["", "read"], [list(row) for row in rows])
     page.section("The cells before they open").figure(
         _base_figure(data, unit),

@@ -17,6 +17,7 @@ from ..search.starts import TriedStart
 from ..structures.base import Design
 from ..structures.strength import beyond_limit
 from ..units import unit_of
+from ..wording import counted
 from .designs import DrawnDesign, DrawnState
 from .history import History, HistoryStep
 from .parameters import ElementCloud, PartSpace
@@ -216,16 +217,16 @@ def remarks(result: KitResult, verdicts: bool = False) -> list[str]:
     if len(result.designs) > 1 and "stock" not in result.settings:
         count = result.piece_count()
         found.append(
-            f"{count.fabricated} pieces have to be made so that the designs can be built one after "
-            f"the other; they have {count.elements} elements."
+            f"{counted(count.fabricated, 'piece has', 'pieces have')} to be made so "
+            "that the designs "
+            f"can be built one after the other; they have {counted(count.elements, 'element')}."
         )
     if "published" in result.stages and result.seconds:
         found.append(_about_published(result))
     if len(result.tried) > 1:
         found.append(_about_starts(result.tried))
     return found + [
-        f"The {name} stage ended after {stage.steps} step{'s' * (stage.steps != 1)}: "
-        f"{stage.status}."
+        f"The {name} stage ended after {counted(stage.steps, 'step')}: {stage.status}."
         for name, stage in stages.items()
         if stage.status and name != "published_opened"  # the same steps, only opened
     ]
@@ -247,7 +248,7 @@ def _about_published(result: KitResult) -> str:
     return (
         f"The published method (BFGS, nearest parts, no reassignment) with as many parts: "
         f"{told('published')} in the states that the designs are led to, "
-        f"{told('published_opened')} as they open; {steps} steps in "
+        f"{told('published_opened')} as they open; {counted(steps, 'step')} in "
         f"{result.seconds['published']:.0f} s. This kit: {told('assigned')}; "
         f"{result.seconds['search']:.0f} s."
     )
@@ -260,7 +261,7 @@ def _about_starts(tried: Sequence[TriedStart]) -> str:
     origin = "that of the relaxed stage" if kept.origin == "relaxed" else "found under the model"
     others = ", ".join(f"{end:.4g}" for end in sorted(ends))
     return (
-        f"{len(tried)} starts of the assigned stage were built, the best {len(ends)} optimised "
+        f"{counted(len(tried), 'start')} of the assigned stage, the best {len(ends)} optimised "
         f"(J = {others}); the one kept is {origin}."
     )
 

@@ -18,6 +18,7 @@ from ..io.results import save_result, save_states
 from ..kit.kinds import part_kind
 from ..search.result import KitResult
 from ..units import unit_of
+from ..wording import counted, counted_parts
 from .designs import draw_designs
 from .environment import environment
 from .history import draw_history
@@ -104,7 +105,6 @@ def _page(
     verdicts: Sequence[Buildable],
     extend: Callable[[Page], object],
 ) -> Page:
-    sizes = " and ".join(f"{count} {kind}" for kind, count in result.kit.sizes.items())
     elements = sum(design.n_elements for design in result.designs)
     designs = "a design" if len(result.designs) == 1 else f"{len(result.designs)} designs"
     title = (
@@ -112,8 +112,9 @@ def _page(
         if "kit" in result.settings
         else f"One kit of parts for {designs}"
     )
+    verb = "realises" if sum(result.kit.sizes.values()) == 1 else "realise"
     about = (
-        f"{sizes} parts realise the {elements} elements of "
+        f"{counted_parts(result.kit.sizes)} {verb} the {counted(elements, 'element')} of "
         f"{', '.join(d.name for d in result.designs)}."
     )
     if verdicts:
@@ -181,14 +182,14 @@ def _page(
         several = isinstance(parts[0], list)
         unit = unit_of("angle" if part_kind(kind).angular else "length", result.units)
         page.details(
-            f"The {len(parts)} {kind} parts, {unit}",
+            f"The {counted_parts({kind: len(parts)})}, {unit}",
             {str(k): part if several else [part] for k, part in enumerate(parts, 1)},
         )
     extend(page)
     page.section(
         "How it was made",
-        f"{result.equilibria:,} equilibria and {result.newton_iterations:,} Newton "
-        f"iterations in {result.wall_s:.0f} s.",
+        f"{counted(result.equilibria, 'equilibrium', 'equilibria')} and "
+        f"{counted(result.newton_iterations, 'Newton iteration')} in {result.wall_s:.0f} s.",
     )
     return page.details("Settings", result.settings).details("Versions and machine", environment())
 
@@ -210,7 +211,7 @@ def _parts(page: Page, result: KitResult) -> None:
         page.drawings(
             headings,
             [_part_row(one, len(names)) for one in drawings],
-            folded=f"All {len(drawings)} pieces that are cut for them",
+            folded="Every piece that is cut for them",
         )
 
 
@@ -230,8 +231,9 @@ def _all_possible(verdicts: Sequence[Buildable]) -> bool:
 
 def _outcome(result: KitResult) -> str:
     """Of how many parts, and how far off the worst design is at most."""
-    sizes = " and ".join(f"{count} {kind}" for kind, count in result.kit.sizes.items())
-    return f"{sizes} parts keep {deviation_words(result)}."
+    one = sum(result.kit.sizes.values()) == 1
+    keep = "keeps" if one else "keep"
+    return f"{counted_parts(result.kit.sizes)} {keep} {deviation_words(result)}."
 
 
 def _stops(verdicts: Sequence[Buildable]) -> list[str]:

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..drawing.style import FAINT, PALETTE, style
+from ..wording import counted
 
 _CLOUD_COLOURS = (FAINT, PALETTE["blue"], PALETTE["green"])
 _PART = PALETTE["vermillion"]
@@ -55,7 +56,7 @@ def draw_parameters(spaces: Sequence[PartSpace]) -> Figure:
     with style():
         figure = Figure(figsize=(4.75 * len(spaces), 4.4), layout="constrained")
         for ax, space in zip(figure.subplots(1, len(spaces), squeeze=False)[0], spaces):
-            ax.set_title(f"{space.kind}: {len(space.parts)} parts")
+            ax.set_title(f"{space.kind}: {counted(len(space.parts), 'part')}")
             if np.shape(space.parts)[1] == 1:
                 _draw_line(ax, space)
             else:

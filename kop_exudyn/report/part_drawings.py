@@ -19,6 +19,7 @@ from ..fabrication.templates import templates
 from ..kit.kinds import PartKind, has_joint, part_kind
 from ..search.result import KitResult
 from ..units import unit_of
+from ..wording import counted
 
 _WIDEST = 300.0  # pixels: of the largest drawing
 _LEAST = 6.0  # pixels: what is thinner is drawn at a larger scale
@@ -78,7 +79,7 @@ def part_rows(drawings: Sequence[PartDrawing], parts: PartsList) -> list[PartDra
         rows.append(
             PartDrawing(
                 label,
-                f"{len(pieces)} boards, {_together([one.about for one in pieces])}",
+                f"{counted(len(pieces), 'board')}, {_together([one.about for one in pieces])}",
                 widest.svg,
                 widest.width,
                 tuple(int(n) for n in parts.counts[kind][:, k]),

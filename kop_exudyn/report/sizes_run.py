@@ -24,6 +24,7 @@ from ..search.run import check_request, described_job, digest
 from ..search.settings import JobSettings
 from ..structures.base import Design
 from ..structures.serving import served_by
+from ..wording import counted_parts
 from .environment import environment
 from .kit_report import write_kit_report
 from .kit_run import progress_bar, within_workshop
@@ -158,9 +159,7 @@ def tradeoff_and_report(
         for kit in kits:
             name = "-".join(f"{count}_{kind}" for kind, count in kit.sizes.items())
             write_kit_report(kit.result, run.folder.path / name)
-            links[f"{' and '.join(f'{n} {kind}' for kind, n in kit.sizes.items())} parts"] = (
-                f"{name}/index.html"
-            )
+            links[counted_parts(kit.sizes)] = f"{name}/index.html"
         page.section("The kits").links(links)
         page.details("Settings", kits[-1].result.settings)
         page.details("Versions and machine", environment())

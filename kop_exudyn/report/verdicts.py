@@ -18,6 +18,7 @@ from ..search.pool import DesignPool
 from ..search.requirements import Requirements
 from ..search.result import KitResult
 from ..units import Units, in_millimetres, unit_of
+from ..wording import counted
 
 _MOST_STOPS = 2  # of a design are named in its line
 
@@ -194,7 +195,7 @@ def _cutting(verdict: Buildable) -> str | None:
     if verdict.fabrication is None:
         return None
     count = len(verdict.fabrication)
-    return f"{count} problem{'s' if count > 1 else ''}" if count else "fine"
+    return counted(count, "problem") if count else "fine"
 
 
 def _margins(verdicts: Sequence[Buildable], units: Units | None) -> str:

@@ -27,6 +27,7 @@ from ..structures.fitting import FitResult, Placement, TargetFitting, best_place
 from ..structures.opening import SAME_STATE
 from ..structures.strength import design_strength
 from ..units import Units, in_millimetres
+from ..wording import counted, counted_parts
 from .clipping import clipped
 from .viewer import ViewerDesign, ViewerPart, ViewerRods, ViewerScene, ViewerState
 
@@ -56,9 +57,8 @@ def kit_scene(result: KitResult, *, frames: int = 0, title: str | None = None) -
             else:
                 failed[stage] = outcome.reason
         designs.append(drawing.finish(states, failed))
-    sizes = " and ".join(f"{count} {kind}" for kind, count in result.kit.sizes.items())
     return ViewerScene(
-        title or f"{sizes} parts for {len(designs)} designs",
+        title or f"{counted_parts(result.kit.sizes)} for {counted(len(designs), 'design')}",
         designs,
         viewer_parts(parts),
         unit=_length(result.units),

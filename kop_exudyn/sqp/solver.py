@@ -14,6 +14,7 @@ import scipy.sparse as sp
 
 from ..checks import check_choice, check_not_negative, check_positive, check_whole
 from ..errors import InputError, SimulationFailure
+from ..wording import counted
 from .constraints import check_feasible, validate_bounds
 from .curvature import SecantCorrection
 from .history import SQPState, StepRecord
@@ -208,7 +209,8 @@ class _Run:
             return self._result(state, point, True, text)
         if state.step >= self.options.max_steps:
             text = (
-                f"stopped after {state.step} steps: raise max_steps or resume from the last state"
+                f"stopped after {counted(state.step, 'step')}: raise max_steps or "
+                "resume from the last state"
             )
             return self._result(state, point, False, text)
         model = self._model(point, derivatives, state.penalty)
@@ -410,13 +412,15 @@ class _Run:
             )
         elif failures:
             text = (
-                f"stopped: {failures} of the last {trials} trial points could not be simulated "
+                f"stopped: {failures} of the last {counted(trials, 'trial point')} "
+                "could not be simulated "
                 f"(last: {last}); "
                 "start elsewhere or tighten the bounds"
             )
         else:
             text = (
-                f"stopped: none of the last {trials} trial points attained the predicted "
+                f"stopped: none of the last {counted(trials, 'trial point')} attained "
+                "the predicted "
                 f"reduction; the objective is "
                 "at its numerical accuracy or its derivatives are wrong"
             )

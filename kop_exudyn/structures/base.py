@@ -22,6 +22,7 @@ from ..geometry.triangles import TriangleSurface
 from ..kit.groups import ElementGroup
 from ..plugins import Registry
 from ..units import Units, units_from_dict
+from ..wording import counted
 from .hardware import CellHardware
 from .loads import LoadCase, load_cases_from_dict
 
@@ -124,7 +125,9 @@ class Design(ABC):
 
     def __repr__(self) -> str:
         unit = "" if self.units is None else f", in {self.units.length}"
-        return f"<{self.class_name} design {self.name!r}: {self.n_elements} elements{unit}>"
+        return (
+            f"<{self.class_name} design {self.name!r}: {counted(self.n_elements, 'element')}{unit}>"
+        )
 
     @abstractmethod
     def scene(self, role: str) -> Scene:

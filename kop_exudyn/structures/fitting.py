@@ -17,6 +17,7 @@ from ..checks import check_positive
 from ..errors import InputError
 from ..geometry.triangles import Closest
 from ..rods.rotations import exp_so3, hat
+from ..wording import counted
 from .base import Target
 
 _MAX_ITERATIONS = 100
@@ -70,7 +71,8 @@ class FitResult:
 
     def __repr__(self) -> str:
         return (
-            f"<FitResult of {len(self.distances)} joints: at most {self.max_percent:.3g} % off, "
+            f"<FitResult of {counted(len(self.distances), 'joint')}: at most "
+            f"{self.max_percent:.3g} % off, "
             f"{self.mean_percent:.3g} % in the mean>"
         )
 

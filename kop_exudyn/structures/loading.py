@@ -25,6 +25,7 @@ from ..rods.sections import Section
 from ..scene.loads import DeadForces, Scaled, with_self_weight
 from ..scene.scene import Scene
 from ..scene.terms import SceneTerm
+from ..wording import counted
 from .base import Design
 from .loads import LoadCase, hold_in_place, tributary_areas
 from .strength import Strength, material_values, materials_of, rod_strength
@@ -60,7 +61,7 @@ class LoadedState:
     def __repr__(self) -> str:
         return (
             f"<LoadedState under {self.case.name!r}: deflection {self.deflections.max():.3g}, "
-            f"{len(self.supports)} supports>"
+            f"{counted(len(self.supports), 'support')}>"
         )
 
     @property

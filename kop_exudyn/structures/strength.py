@@ -28,6 +28,7 @@ import numpy as np
 from ..equilibrium.equilibria import Equilibrium
 from ..rods.sections import Material, Section
 from ..scene.scene import Scene
+from ..wording import counted
 from .base import Design
 
 TRANSVERSE = 1.5  # largest over mean shear stress of a transverse force
@@ -64,7 +65,7 @@ class Strength:
 
     def __repr__(self) -> str:
         used = "" if self.largest is None else f", at most {100 * self.largest:.0f} % of the limit"
-        return f"<Strength of {len(self.equivalent)} rod elements{used}>"
+        return f"<Strength of {counted(len(self.equivalent), 'rod element')}{used}>"
 
     @property
     def utilisation(self) -> np.ndarray:

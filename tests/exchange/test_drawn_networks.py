@@ -224,7 +224,7 @@ class TestNetworks:
         doubled = DrawnCurve(np.array([[0, 0, 0], [0, 0, 0], [1, 0, 0]], float), False, "a")
         read = drawn_network(Drawing([doubled, piece((0.5, -1), (0.5, 1))]))
         assert read.entries[0]["points"] == [[0, 0], [1, 0]]
-        assert [f.text for f in read.findings] == ["1 repeated points left out of a"]
+        assert [f.text for f in read.findings] == ["1 repeated point left out of a"]
 
 
 class TestLargeDrawings:
