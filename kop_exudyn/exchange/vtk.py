@@ -1,5 +1,10 @@
 """States as VTU for ParaView and meshio: every rod element with its part, strains, stress
-resultants and utilisation, every point with its deviation."""
+resultants and utilisation, every point with its deviation.
+
+Arrays are named with their unit, as "deviation [mm]", which ParaView writes at its colour bars. The
+unit of the coordinates is in the name of a field array, "metres_per_mm", as VTU has no place for
+it.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +18,21 @@ from ..equilibrium.equilibria import Equilibrium
 from ..files.files import write_bytes
 from ..scene.scene import Scene
 from ..structures.strength import Strength
+from ..units import Units, unit_of
 from .states import DesignState
 
 _RESULTANTS = ("N", "Qy", "Qz", "Mt", "My", "Mz")
 _STRAINS = ("stretch", "shear_y", "shear_z", "twist", "curvature_y", "curvature_z")
+_QUANTITIES = {
+    "rest_length": "length",
+    "deviation": "length",
+    **dict.fromkeys(("twist", "curvature_y", "curvature_z"), "curvature"),
+    **dict.fromkeys(("N", "Qy", "Qz"), "force"),
+    **dict.fromkeys(("Mt", "My", "Mz"), "moment"),
+    **dict.fromkeys(
+        ("axial_stress", "normal_stress", "shear_stress", "equivalent_stress"), "stress"
+    ),
+}
 
 
 def element_fields(
@@ -95,9 +111,41 @@ def write_vtu(
     *,
     overwrite: bool = False,
 ) -> Path:
-    """Write a state. Raises InputError when the file exists or can't be written."""
+    """Write a state, its arrays named with their units where the design names any. Raises
+    InputError when the file exists or can't be written."""
+    mesh, units = vtu_mesh(state, labels), state.design.units
+    mesh.point_data = {with_its_unit(k, units): v for k, v in mesh.point_data.items()}
+    mesh.cell_data = {with_its_unit(k, units): v for k, v in mesh.cell_data.items()}
     with tempfile.TemporaryDirectory() as folder:
         temporary = Path(folder) / "state.vtu"
-        vtu_mesh(state, labels).write(temporary)
+        mesh.write(temporary)
         content = temporary.read_bytes()
+    if units is not None:
+        begin = b"<UnstructuredGrid>"
+        content = content.replace(begin, begin + _field_data(units), 1)
     return write_bytes(path, content, overwrite=overwrite)
+
+
+def with_its_unit(name: str, units: Units | None) -> str:
+    """The name of a field of a state with its unit, as "My [N mm]"; alone where it has none."""
+    quantity = _QUANTITIES.get(name)
+    if quantity is None or units is None:
+        return name
+    own = {"curvature": f"1/{units.length}", "moment": f"{units.force} {units.length}"}
+    unit = own.get(quantity) or unit_of(quantity, units)
+    return f"{name} [{unit.replace('²', '^2')}]"
+
+
+def _field_data(units: Units) -> bytes:
+    """Arrays of one number each whose names say the units of length and force: meshio reads numbers
+    only there."""
+    values = {
+        f"metres_per_{units.length}": units.metres,
+        f"newtons_per_{units.force}": units.newtons,
+    }
+    arrays = "".join(
+        f'<DataArray type="Float64" Name="{name}" NumberOfTuples="1" format="ascii">{value!r}'
+        "</DataArray>"
+        for name, value in values.items()
+    )
+    return f"<FieldData>{arrays}</FieldData>".encode()

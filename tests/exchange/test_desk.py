@@ -1,5 +1,6 @@
 """The folder for the desk, read back by the programs' own libraries."""
 
+import copy
 import csv
 from dataclasses import replace
 
@@ -22,6 +23,7 @@ from kop_exudyn.exchange.export import (
 )
 from kop_exudyn.exchange.gltf import glb_bytes
 from kop_exudyn.exchange.states import states_of_kit, states_of_simulation
+from kop_exudyn.exchange.vtk import write_vtu
 from kop_exudyn.fabrication.pieces import parts_list_of
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings
@@ -137,6 +139,26 @@ def test_vtu_read_by_meshio(folder, state, result):
     numbers = {row["number"]: row["part"] for row in read(folder / "parts.csv")}
     for rod, part in zip(fields["rod"], fields["part"]):
         assert numbers[str(part)] == labels[part - 1] == state.parts[rod]
+
+
+def test_a_vtu_file_says_its_units(state, tmp_path):
+    """Kilonewtons and millimetres; none where the design names none."""
+    for units, deviation, moment in (
+        (Units("mm", "kN"), "deviation [mm]", "My [kN mm]"),
+        (Units("ft", "kip"), "deviation [ft]", "My [kip ft]"),
+        (None, "deviation", "My"),
+    ):
+        other = copy.copy(state.design)
+        other.units = units
+        path = write_vtu(tmp_path / "a.vtu", replace(state, design=other), overwrite=True)
+        found = meshio.read(path)
+        assert deviation in found.point_data and moment in found.cell_data
+        assert "stretch" in found.cell_data  # has no unit
+        said = {} if units is None else {f"metres_per_{units.length}": units.metres}
+        assert said.items() <= found.field_data.items()
+        assert bool(found.field_data) == (units is not None)
+        # in squares as plain letters: colour bars of other programs lack raised ones
+        assert all(name.isascii() for name in found.cell_data)
 
 
 def test_obj_has_a_group_for_every_rod_and_the_target_a_file(folder, state):
