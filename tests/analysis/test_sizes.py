@@ -5,6 +5,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from support.settings import FEW_ERRORS
 from support.zigzags import zigzags
 
 from kop_exudyn.analysis.sizes import KitCost, deviation, smallest_kit, trade_off, unmet
@@ -24,7 +25,7 @@ STAGES = StageSettings(
     leaps=0,
     effort="quick",
     levelling=0,
-    requirements=Requirements(samples=2),
+    requirements=FEW_ERRORS,
 )
 SETTINGS = JobSettings(jobs=1, stages=STAGES, baselines=False)
 

@@ -106,17 +106,17 @@ def complaint(data, schema):
     return None
 
 
-@pytest.mark.parametrize("model", ["conformals/01_sinh", "grids/01_dome", "umbrellas/hill"])
+@pytest.mark.parametrize("model", ["conformals/01_sinh", "grids/01_dome", "umbrellas/dome"])
 def test_what_is_accepted_quickly_is_what_is_accepted(repository, model, monkeypatch):
     """Two validators read the same schemas: nothing passes the quick one that the other refuses."""
     data = json.loads((repository / "models" / f"{model}.json").read_text(encoding="utf-8"))
     rng = np.random.default_rng(5)
-    files = [damaged(data, rng) for _ in range(150)]
+    files = [damaged(data, rng) for _ in range(40)]
     schemas = ["design", data["class"]]
     found = [complaint(file, schema) for file in files for schema in schemas]
     monkeypatch.setattr(documents, "_is_accepted", lambda data, schema: False)
     assert found == [complaint(file, schema) for file in files for schema in schemas]
-    assert 50 < sum(words is None for words in found) < 250
+    assert 10 < sum(words is None for words in found) < 70
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from support.settings import FEW_ERRORS
 from support.zigzags import zigzags
 
 from kop_exudyn.errors import InputError
@@ -17,7 +18,15 @@ from kop_exudyn.report import sizes_run
 from kop_exudyn.report.sizes_run import smallest_and_report, tradeoff_and_report
 from kop_exudyn.search.settings import JobSettings, StageSettings
 
-STAGES = StageSettings(schedule=(1e3, 1e5), path_steps=4, leaps=0, reassignments=1, effort="quick")
+STAGES = StageSettings(
+    schedule=(1e3, 1e5),
+    path_steps=4,
+    leaps=0,
+    reassignments=1,
+    effort="quick",
+    levelling=0,
+    requirements=FEW_ERRORS,
+)
 SETTINGS = JobSettings(jobs=1, stages=STAGES, baselines=False)
 SIZES = [{"linear": n, "angular": 2} for n in (2, 4)]
 

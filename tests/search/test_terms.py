@@ -1,11 +1,11 @@
 """The objective's terms: exact gradients, honest models, and one that is added from outside."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.settings import FEW_STEPS
+from support.grids import coarse_grid
+from support.settings import FEW_ERRORS, FEW_STEPS
 
 from kop_exudyn.equilibrium.newton import NewtonOptions
 from kop_exudyn.errors import InputError
@@ -77,9 +77,8 @@ def test_weights_by_name():
 
 
 def coarse(repository, name):
-    """A grid of models/grids with one element a piece."""
-    data = json.loads((repository / "models" / "grids" / f"{name}.json").read_text())
-    return design_from_dict(data | {"elements_per_piece": 1})
+    """Every second curve of a grid of models/grids, with one element a piece."""
+    return design_from_dict(coarse_grid(repository, name) | {"elements_per_piece": 1})
 
 
 def test_more_weight_on_stress_lowers_it(repository):
@@ -161,6 +160,8 @@ def test_a_term_is_one_class(repository, monkeypatch, jobs):
             assigned_steps=3,
             redeployments=0,
             effort="quick",
+            levelling=0,
+            requirements=FEW_ERRORS,
         ),
     )
     outcome = optimize_kit(designs, {"linear": 2, "angular": 2}, settings=settings)

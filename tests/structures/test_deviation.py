@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from support.settings import ONE_STEP
 
 import kop_exudyn as kop
 from kop_exudyn.analysis.simulation import simulate
 from kop_exudyn.exchange.result_tables import result_tables
 from kop_exudyn.search.run import optimize_kit
-from kop_exudyn.search.settings import JobSettings, StageSettings
+from kop_exudyn.search.settings import JobSettings
 from kop_exudyn.structures.base import design_from_dict
 from kop_exudyn.structures.deviation import deviation
 from kop_exudyn.structures.fitting import TargetFitting
@@ -76,13 +77,7 @@ def test_umbrella_meshes_are_judged_by_their_joints(repository):
 
 
 def test_result_and_tables_have_the_same_numbers(shells):
-    settings = JobSettings(
-        jobs=1,
-        baselines=False,
-        stages=StageSettings(
-            schedule=(1e4,), relaxed_steps=1, assigned_steps=1, reassignments=0, path_steps=2
-        ),
-    )
+    settings = JobSettings(jobs=1, baselines=False, stages=ONE_STEP)
     result = optimize_kit(shells, {"linear": 3, "angular": 2}, settings=settings)
     rows = result_tables(result)["designs"]
     for n, design in enumerate(shells):

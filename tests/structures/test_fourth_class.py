@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support.settings import FEW_ERRORS
 
 import lib.stress.arch  # noqa: F401  # registers the class
 from kop_exudyn.errors import InputError
@@ -35,7 +36,8 @@ def test_the_class_is_registered_beside_the_built_in_ones():
 
 
 def test_two_stages_beat_the_direct_projection():
-    outcome = optimize_kit(designs(), {"linear": 3}, settings=JobSettings(jobs=1))
+    settings = JobSettings(jobs=1, stages=StageSettings(effort="quick"))
+    outcome = optimize_kit(designs(), {"linear": 3}, settings=settings)
     direct, assigned = outcome.stages["direct"], outcome.stages["assigned"]
     assert assigned.value < 0.5 * direct.value
     for evaluation in assigned.designs:
@@ -46,7 +48,7 @@ def test_two_stages_beat_the_direct_projection():
 
 
 def test_results_do_not_depend_on_the_number_of_processes():
-    settings = StageSettings(schedule=(1e3, 1e5))
+    settings = StageSettings(schedule=(1e3, 1e5), effort="quick", requirements=FEW_ERRORS)
     one, two = (
         optimize_kit(designs(), {"linear": 3}, settings=JobSettings(jobs=jobs, stages=settings))
         for jobs in (1, 2)

@@ -1,7 +1,10 @@
 """Settings of searches whose results only have to be there."""
 
+from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.settings import StageSettings
 
+# What errors do takes more simulations than all steps of such searches: a few sets of them tell.
+FEW_ERRORS = Requirements(samples=2)
 # A short search that moves the parts to where the objective's terms tell.
 FEW_STEPS = StageSettings(
     schedule=(1e4,),
@@ -10,6 +13,8 @@ FEW_STEPS = StageSettings(
     reassignments=0,
     redeployments=0,
     effort="quick",
+    levelling=0,
+    requirements=FEW_ERRORS,
 )
 # One accepted step a stage: files and pages don't need more.
 ONE_STEP = StageSettings(
@@ -20,4 +25,5 @@ ONE_STEP = StageSettings(
     path_steps=2,
     effort="quick",
     levelling=0,
+    requirements=FEW_ERRORS,
 )
