@@ -179,7 +179,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     shell.add_argument(
         "--edges",
         action="store_true",
-        help="of a mesh (.obj, COMPAS .json) or a COMPAS graph: its edges are the curves",
+        help="of a mesh (.obj, .ply, COMPAS .json) or a graph (.ply, COMPAS .json): its edges are "
+        "the curves",
     )
     shell.add_argument(
         "--tolerance",

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..files.files import read_bytes
 from ..geometry.nurbs import spline_points
-from ..geometry.obj_files import ObjContent, parse_obj
+from ..geometry.obj_files import ObjContent, first_words, parse_obj
 from ..units import LENGTHS
 from ..wording import counted
 from .drawing import SAG, Drawing, DrawnCurve
@@ -83,11 +83,8 @@ def is_surface(path: str | Path) -> bool:
     InputError when it can't be read."""
     if not str(path).lower().endswith(".obj"):
         return False
-    try:
-        content = parse_obj(read_bytes(path, SIZE_LIMIT))
-    except InputError as error:
-        raise error.at(path) from None
-    return bool(content.faces) and not content.lines and not content.curves
+    words = first_words(read_bytes(path, SIZE_LIMIT))
+    return bool(words & {"f", "fo"}) and not words & {"l", "curv"}
 
 
 def _obj_drawing(content: bytes, layers: Sequence[str]) -> Drawing:

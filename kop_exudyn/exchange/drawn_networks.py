@@ -109,19 +109,27 @@ class DrawnNetwork:
         """What the curves are called in the drawing."""
         return [curve.label for curve in self.curves]
 
-    @cached_property
+    @property
     def network(self) -> CurveNetwork:
         """The curves, joined where they cross. Raises InputError, naming the curve as the drawing
         does, where no network comes of them (see `network.network`)."""
+        if isinstance(self._joined, InputError):
+            error = self._joined
+            raise InputError(error.message, field=error.field, value=error.value)
+        return self._joined
+
+    @cached_property
+    def _joined(self) -> CurveNetwork | InputError:
+        """The network, or why there is none: found once, whoever asks again."""
         try:
             return network(self._curves(), free_ends=self.options.free_ends, acute=True)
         except InputError as error:
             named = self.named(error)
             more = self._crowded() or self._short_of(named.field) or self._advice(named)
             if more is None:
-                raise named from None
+                return named
             message = f"{named.message}. {more[0].upper()}{more[1:]}"
-            raise InputError(message, field=named.field, value=named.value) from None
+            return InputError(message, field=named.field, value=named.value)
 
     def named(self, error: InputError) -> InputError:
         """An error about a design with the curves named as in the drawing."""

@@ -1,10 +1,10 @@
-"""Nets that are drawn as meshes or graphs: the edges of faces in OBJ files, of COMPAS meshes and
-graphs."""
+"""Nets that are drawn as meshes or graphs: the edges of faces in OBJ and PLY files, of COMPAS
+meshes and graphs."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +14,13 @@ from ..checks import LARGEST
 from ..errors import InputError
 from ..files.files import read_bytes
 from ..geometry.obj_files import parse_obj
+from ..geometry.ply_files import parse_ply
 from ..units import LENGTHS
 from .curve_files import MOST_CURVES, SIZE_LIMIT, said_unit
 from .drawing import Drawing, DrawnCurve
 from .outlines import place_of
 
-EDGE_SUFFIXES = (".obj", ".json")
+EDGE_SUFFIXES = (".obj", ".ply", ".json")
 Edges = tuple[np.ndarray, list[tuple[int, int]]]
 
 
@@ -32,14 +33,14 @@ def edges_of(path: Path) -> Drawing:
     suffix = path.suffix.lower()
     if suffix not in EDGE_SUFFIXES:
         raise InputError(
-            f"edges are read of {' and '.join(EDGE_SUFFIXES)} files: save the mesh as OBJ, with "
+            f"edges are read of {', '.join(EDGE_SUFFIXES)} files: save the mesh as OBJ, with "
             "its quads as they are",
             source=path,
             field="--edges",
         )
     content = read_bytes(path, SIZE_LIMIT)
     try:
-        points, pairs = _of_obj(content) if suffix == ".obj" else _of_compas(content)
+        points, pairs = _READERS[suffix](content)
     except InputError as error:
         raise error.at(path) from None
     if not pairs:
@@ -62,6 +63,13 @@ def edges_of(path: Path) -> Drawing:
 def _of_obj(content: bytes) -> Edges:
     found = parse_obj(content)
     return found.vertices, _sides(face for face, _ in found.faces)
+
+
+def _of_ply(content: bytes) -> Edges:
+    """Its own edges; of files without any, those of its faces."""
+    found = parse_ply(content)
+    own = sorted({(min(pair), max(pair)) for pair in found.edges if pair[0] != pair[1]})
+    return found.vertices, own or _sides(found.polygons)
 
 
 def _of_compas(content: bytes) -> Edges:
@@ -122,6 +130,13 @@ def _sides(polygons: Iterable[Sequence[int]]) -> list[tuple[int, int]]:
         if a != b
     }
     return sorted(pairs)
+
+
+_READERS: dict[str, Callable[[bytes], Edges]] = {
+    ".obj": _of_obj,
+    ".ply": _of_ply,
+    ".json": _of_compas,
+}
 
 
 def _structures(data: Any) -> Iterator[Mapping[str, Any]]:

@@ -30,6 +30,13 @@ def without_overlaps(
     lines = np.array([_line(curve) for curve in curves])
     i, j = shapely.STRtree(lines).query(lines, predicate="intersects")
     i, j = i[i < j], j[i < j]
+    # what curves share lies in both their boxes: most neighbours in a net meet in a point
+    low, high = np.split(shapely.bounds(lines), 2, axis=1)
+    common = np.minimum(high[i], high[j]) - np.maximum(low[i], low[j])
+    may_share = np.hypot(*common.T) > tolerance
+    i, j = i[may_share], j[may_share]
+    if not len(i):
+        return curves, []
     grid = _GRID * tolerance
     shared = shapely.length(shapely.intersection(lines[i], lines[j], grid_size=grid))
     some = shared > tolerance

@@ -16,6 +16,7 @@ import numpy as np
 from ..errors import InputError
 from .mesh_cleaning import WELD, cleaned, triangles_of
 from .obj_files import parse_obj
+from .ply_files import elements_of, parse_ply
 
 log = logging.getLogger(__name__)
 
@@ -111,7 +112,11 @@ def _stl(content: bytes) -> Mesh:
 
 
 def _ply(content: bytes) -> Mesh:
-    return _by_trimesh(content, "ply")
+    if "tristrips" not in elements_of(content):
+        return _by_trimesh(content, "ply")
+    found = parse_ply(content)
+    _check_count(len(found.polygons))
+    return found.vertices, triangles_of(found.polygons, found.vertices)
 
 
 def _off(content: bytes) -> Mesh:

@@ -4,6 +4,7 @@ textures, normals and groups are passed over, and no other file is opened."""
 from __future__ import annotations
 
 import codecs
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
@@ -116,6 +117,12 @@ def parse_obj(content: bytes) -> ObjContent:
         curves,
         left_out,
     )
+
+
+def first_words(content: bytes) -> set[str]:
+    """The words that lines of an OBJ file begin with, which say what is in it: without reading
+    it."""
+    return set(re.findall(r"^[ \t]*([a-z]\w*)(?=\s)", _text(content), re.MULTILINE))
 
 
 def _text(content: bytes) -> str:

@@ -44,7 +44,7 @@ def test_edges_of_a_mesh_become_laths(tmp_path, capsys):
     assert (told["summary"]["curves"], told["summary"]["joints"]) == (7, 12)
     status, told = imported(tmp_path, capsys, "edges_of_compas_graph.json", "--edges")
     assert status == 0 and told["summary"]["joints"] == 12
-    status, told = imported(tmp_path, capsys, "quads.ply", "--edges")
+    status, told = imported(tmp_path, capsys, "ascii.stl", "--edges")
     assert status == 2 and "save the mesh as OBJ" in told
 
 
