@@ -30,14 +30,20 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 # Files of tests that take longest by themselves come first, so that several processes, each of
 # which takes a whole file at a time, end together.
 LONG = (
-    "docs/test_tutorial.py",
-    "studies/test_quick_studies.py",
     "stress/test_kill_resume.py",
-    "studies/test_stress.py",
+    "studies/test_quick_studies.py",
     "stress/test_optimisation_stress.py",
-    "studies/test_benchmark.py",
-    "docs/test_notebooks.py",
     "studies/test_quick_kits_of_classes.py",
+    "docs/test_tutorial.py",
+    "docs/test_notebooks.py",
+    "studies/test_stress.py",
+    "search/test_further_rounds.py",
+    "report/test_viewer.py",
+    "studies/test_quick_stage_studies.py",
+    "test_types.py",
+    "studies/test_benchmark.py",
+    "analysis/test_engines.py",
+    "docs/test_site.py",
 )
 
 

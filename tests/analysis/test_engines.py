@@ -7,6 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.grids import coarse_grid
+from support.shells import shell_data
+from support.umbrellas import make
 
 import kop_exudyn as kop
 from kop_exudyn.cli import main
@@ -14,19 +17,19 @@ from kop_exudyn.equilibrium import newton
 from kop_exudyn.errors import InputError
 from kop_exudyn.structures.base import design_from_dict
 
-DESIGNS = ["small/01_sinh", "grids/02_saddle", "umbrellas/dome"]
+CLASSES = ["c_shell", "grid", "umbrella"]
 _SAME = 1e-6  # of the size: joints of the two engines' states
 
 
 def content(repository, name: str) -> dict:
-    """A design file's content, with few elements."""
-    data = json.loads((repository / "models" / f"{name}.json").read_text())
-    if data["class"] == "umbrella":
-        return data | {"plate_model": "rigid", "arm_elements": 1}
+    """The content of a small design's file, with few elements."""
+    if name == "umbrella":
+        return make("bowl", 1) | {"plate_model": "rigid", "arm_elements": 1}
+    data = shell_data("shell") if name == "c_shell" else coarse_grid(repository)
     return data | {"elements_per_piece": 1}
 
 
-@pytest.mark.parametrize("name", DESIGNS)
+@pytest.mark.parametrize("name", CLASSES)
 def test_exudyn_deploys_a_design_of_every_class(repository, name, monkeypatch):
     """To the fast solver's state, from the same start, without asking the fast solver."""
     data = content(repository, name)
@@ -51,7 +54,7 @@ def test_exudyn_deploys_a_design_of_every_class(repository, name, monkeypatch):
 
 
 def test_exudyn_finds_the_state_under_loads(repository):
-    design = design_from_dict(content(repository, "grids/02_saddle"))
+    design = design_from_dict(content(repository, "grid"))
     loads = replace(
         design.loads,
         gravity=np.array([0.0, 0.0, -20.0]),
@@ -74,6 +77,6 @@ def test_the_command(repository, capsys):
 
 
 def test_unknown_engines_are_named(repository):
-    design = design_from_dict(content(repository, "small/01_sinh"))
+    design = design_from_dict(content(repository, "c_shell"))
     with pytest.raises(InputError, match="unknown engine"):
         kop.simulate(design, engine="abaqus")

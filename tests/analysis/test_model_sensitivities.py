@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.grids import coarse_grid
+from support.umbrellas import make
 
 from kop_exudyn.analysis.model_sensitivities import ModelSensitivities
 from kop_exudyn.analysis.simulation import simulate
@@ -44,8 +45,9 @@ def shell(repository):
 
 
 def umbrella(repository):
-    data = json.loads((repository / "models/umbrellas/dome.json").read_text(encoding="utf-8"))
-    return design_from_dict({**data, "plate_model": "rigid"})
+    data = make("bowl", 1)
+    materials = {name: {**own, "density": 9e-10} for name, own in data["materials"].items()}
+    return design_from_dict({**data, "materials": materials, "plate_model": "rigid"})
 
 
 def case_of(name, design):

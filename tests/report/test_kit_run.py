@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from support.settings import FEW_ERRORS
 from support.zigzags import Zigzag, zigzags
 
 from kop_exudyn.equilibrium.exudyn_confirm import confirm
@@ -23,7 +24,10 @@ from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
 
 SETTINGS = JobSettings(
-    jobs=1, stages=StageSettings(schedule=(1e3, 1e5), path_steps=4, effort="quick")
+    jobs=1,
+    stages=StageSettings(
+        schedule=(1e3, 1e5), path_steps=4, effort="quick", requirements=FEW_ERRORS
+    ),
 )
 
 

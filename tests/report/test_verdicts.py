@@ -31,7 +31,8 @@ designs = ["vault.json"]
 baselines = false
 parts = {linear = 8, angular = 6}
 settings = {schedule = [1e5], relaxed_steps = 2, round_steps = 2, path_steps = 2, restarts = 3, \
-leaps = 0, reassignments = 1, redeployments = 0}
+leaps = 0, reassignments = 1, redeployments = 0, levelling = 0}
+requirements = {samples = 2}
 tolerance = {samples = 3}
 """
 

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.settings import FEW_ERRORS
 
 from kop_exudyn.kit.cluster import cluster
 from kop_exudyn.search.dataset import Dataset
@@ -43,6 +44,8 @@ def outcome(designs):
         round_steps=4,
         reassignments=1,
         path_steps=2,
+        levelling=0,
+        requirements=FEW_ERRORS,
     )
     return optimize_kit(
         designs, {"cell": 3}, settings=JobSettings(jobs=1, baselines=False, stages=stages)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.settings import FEW_ERRORS
 from support.zigzags import zigzags
 
 from kop_exudyn.io.results import load_result
@@ -10,7 +11,13 @@ from kop_exudyn.report.kit_run import optimize_and_report
 from kop_exudyn.search.settings import JobSettings, StageSettings
 
 STAGES = StageSettings(
-    schedule=(1e3, 1e5), path_steps=4, leaps=0, redeployments=0, levelling=0, effort="quick"
+    schedule=(1e3, 1e5),
+    path_steps=4,
+    leaps=0,
+    redeployments=0,
+    levelling=0,
+    effort="quick",
+    requirements=FEW_ERRORS,
 )
 SETTINGS = JobSettings(jobs=1, stages=STAGES, baselines=False, published=True)
 

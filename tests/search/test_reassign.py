@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.settings import FEW_ERRORS
 
 from kop_exudyn.kit.kinds import part_kind
 from kop_exudyn.kit.reuse import PieceCount
@@ -256,6 +257,8 @@ def test_constraints_on_elements_hold_in_both_stages(stages):
         leaps=0,
         redeployments=0,
         effort="quick",
+        levelling=0,
+        requirements=FEW_ERRORS,
         constraints=constraints,
     )
     outcome, free = (

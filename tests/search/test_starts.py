@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.settings import FEW_ERRORS
 from support.zigzags import zigzags
 
 from kop_exudyn.errors import InputError
@@ -13,7 +14,13 @@ PARTS = {"linear": 2, "angular": 2}
 
 def found(effort):
     stages = StageSettings(
-        schedule=(1e3, 1e5), path_steps=4, leaps=0, redeployments=0, effort=effort
+        schedule=(1e3, 1e5),
+        path_steps=4,
+        leaps=0,
+        redeployments=0,
+        levelling=0,
+        effort=effort,
+        requirements=FEW_ERRORS,
     )
     return optimize_kit(
         zigzags(), PARTS, settings=JobSettings(jobs=1, stages=stages, baselines=False)

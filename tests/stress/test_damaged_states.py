@@ -20,14 +20,14 @@ from lib.stress.arch import arches
 from lib.stress.damaged_states import DamagedStates, damaged, same
 
 
-def test_three_thousand_damaged_sets(tmp_path):
-    findings = DamagedStates(tmp_path).run(range(3000))
+def test_damaged_sets(tmp_path):
+    findings = DamagedStates(tmp_path).run(range(1200))
     assert findings.wrong == []
-    assert findings.count == 3000
+    assert findings.count == 1200
     for what in ("front", "checkpoint", "state"):
-        assert findings.counts[f"{what}: refused"] > 300, findings.counts
+        assert findings.counts[f"{what}: refused"] > 120, findings.counts
     # what only moves numbers a little is solved to the same equilibrium
-    assert findings.counts["state: an equilibrium"] > 10
+    assert findings.counts["state: an equilibrium"] > 4
 
 
 def test_what_is_let_through_is_noticed(tmp_path, monkeypatch):

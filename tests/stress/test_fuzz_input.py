@@ -28,13 +28,13 @@ pytestmark = pytest.mark.filterwarnings(
 )
 
 
-def test_two_thousand_damaged_files(tmp_path):
-    result = fuzz(range(2000), tmp_path)
+def test_damaged_files(tmp_path):
+    result = fuzz(range(1200), tmp_path)
     assert result.findings == []
-    assert result.count == 2000 and result.slowest[0] < 10
+    assert result.count == 1200 and result.slowest[0] < 10
     for name in corpus(tmp_path):
-        assert result.refused[name] > 10, name
-    assert sum(result.accepted.values()) > 50  # not all that changes a file makes it invalid
+        assert result.refused[name] > 4, name
+    assert sum(result.accepted.values()) > 30  # not all that changes a file makes it invalid
 
 
 def test_mutations_follow_from_the_seed(tmp_path):

@@ -5,9 +5,11 @@ from __future__ import annotations
 
 import errno
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.settings import FEW_ERRORS
 
 from kop_exudyn.errors import InputError
 from kop_exudyn.files import files
@@ -23,8 +25,9 @@ from lib.stress.interruption import FailingStore, MemoryStore, fingerprint, resu
 PARTS = {"linear": 2}
 SCHEDULE = (1e3, 1e5)
 # From one start, with all stages; and from several, which the checkpoints of each begin anew.
-SETTINGS = JobSettings(jobs=1, stages=StageSettings(schedule=SCHEDULE, effort="quick"))
-SEVERAL_STARTS = JobSettings(jobs=1, stages=StageSettings(schedule=SCHEDULE))
+STAGES = StageSettings(schedule=SCHEDULE, requirements=FEW_ERRORS)
+SETTINGS = JobSettings(jobs=1, stages=replace(STAGES, effort="quick"))
+SEVERAL_STARTS = JobSettings(jobs=1, stages=STAGES)
 
 
 class Undisturbed:

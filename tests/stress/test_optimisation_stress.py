@@ -10,6 +10,7 @@ import time
 
 import numpy as np
 import pytest
+from support.settings import FEW_ERRORS
 
 from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.kit.parts import Kit
@@ -25,7 +26,7 @@ SCHEDULE = (1e3, 1e5)
 
 def run(designs, parts, kit=None, **stages):
     """The kit of a job with one start, unless `stages` ask for more."""
-    own = {"schedule": SCHEDULE, "effort": "quick"} | stages
+    own = {"schedule": SCHEDULE, "effort": "quick", "requirements": FEW_ERRORS} | stages
     settings = JobSettings(jobs=1, stages=StageSettings(**own))
     return optimize_kit(
         designs,
@@ -181,7 +182,13 @@ class TestWorkers:
         settings = JobSettings(
             jobs=2,
             stages=StageSettings(
-                schedule=(1e3,), relaxed_steps=2, assigned_steps=2, path_steps=3, effort="quick"
+                schedule=(1e3,),
+                relaxed_steps=2,
+                assigned_steps=2,
+                path_steps=3,
+                effort="quick",
+                levelling=0,
+                requirements=FEW_ERRORS,
             ),
         )
         undisturbed = fingerprint(optimize_kit(designs, {"linear": 2}, settings=settings))

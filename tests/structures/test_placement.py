@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from support.placements import placed
+from support.settings import FEW_ERRORS
 
 from kop_exudyn.analysis.simulation import simulate
 from kop_exudyn.equilibrium.newton import refine, solve
@@ -175,6 +176,7 @@ def test_kits_of_turned_designs_are_the_same(repository):
             reassignments=0,
             path_steps=2,
             effort="quick",
+            requirements=FEW_ERRORS,
             levelling=0.0,  # it ends by the gain of its steps: at the same parts to 1e-4 only
         )
         settings = JobSettings(jobs=1, baselines=False, stages=stages)

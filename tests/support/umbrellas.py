@@ -1,6 +1,7 @@
-"""Umbrella meshes of the sorts that are hard to open, small: files as `design_on_surface` makes
-them.
+"""Small umbrella meshes, an easy one and of the sorts that are hard to open: files as
+`design_on_surface` makes them.
 
+bowl : over a paraboloid
 cap : over most of a sphere, with arms shorter than the plates
 tight : plates that end on each other
 equal : without a target, every cell free to open either way
@@ -34,6 +35,9 @@ def make(sort: str, rings: int = 2) -> dict[str, Any]:
     if sort == "cap":
         surface = parametric_patch(_cap(300.0 * rings, 2.2), 40)
         return design_on_surface("cap", hexagon(rings), *surface, plates=PLATES, least_growth=3.2)
+    if sort == "bowl":
+        bowl = height_field(lambda x, y: -(x**2 + 0.6 * y**2) / 500, 600.0 * rings, 16)
+        return design_on_surface("bowl", hexagon(rings), *bowl)
     flat = height_field(lambda x, y: 0 * x, 2400.0, 10)
     if sort == "tight":
         plates = replace(PLATES, spacing=PLATES.thickness)
