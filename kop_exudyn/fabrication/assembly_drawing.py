@@ -41,6 +41,7 @@ _BESIDE = 1.7  # mm from a rod's axis to the middle of the text beside it
 _GAP = 1.1  # mm on either side of a crossing in which the lower rod isn't drawn
 _ROD = 2.0  # points
 _OVERLAP = 12.0  # mm that neighbouring pages share
+_EDGE = 3.0  # mm at a page's edge in which labels may be missing
 _MARGIN = 12.0  # mm around the drawing on a sheet of its own
 _ALONG = (0.5, 0.36, 0.64, 0.24, 0.76)  # places of a label along its rod
 _AROUND = np.radians([45, 135, 225, 315, 0, 90, 180, 270])
@@ -109,7 +110,9 @@ class AssemblyDrawing:
         found = of_pieces + found if len(self.cells) else found + of_pieces
         points = [*self.joints, *self.corners.values()]
         dots = [shapely.Point(at / scale).buffer(0.6, quad_segs=2) for at in points]
-        rods = [shapely.LineString(line / scale) for line in self.lines]
+        # of cells the plates' edges are drawn, and no rods
+        closed = [cell[[0, 1, 2, 0]] for cell in self.cells]
+        rods = [shapely.LineString(line / scale) for line in closed or self.lines]
         self._found[scale] = found, *place(found, dots, rods)
         return self._found[scale]
 
@@ -381,7 +384,7 @@ def assembly_pages(book: Book, drawing: AssemblyDrawing) -> None:
         np.array([column, row]) for row in reversed(range(counts[1])) for column in range(counts[0])
     ]
     tiles = [corner + at * inner for at in places]  # lower left, on paper at the drawing's scale
-    kept = [k for k, at in enumerate(tiles) if drawn.intersects(shapely.box(*at, *(at + room)))]
+    kept = _needed(drawn, [shapely.box(*at, *(at + room)) for at in tiles])
     names = {tuple(places[k].tolist()): number for number, k in enumerate(kept, 1)}
     page.heading += f": where its {len(kept)} pages are"
     for number, tile in enumerate((tiles[k] for k in kept), 1):
@@ -395,6 +398,16 @@ def assembly_pages(book: Book, drawing: AssemblyDrawing) -> None:
         beside = _neighbours(places[kept[number - 1]], names)
         note = f"{_OVERLAP:g} mm are shared with the next parts: {beside}"
         one.text(one.low[0], one.low[1], note, 7, color=QUIET)
+
+
+def _needed(drawn: Any, windows: Sequence[Any]) -> list[int]:
+    """Numbers of the windows that show something of a drawing that no other one shows."""
+    kept = [k for k, window in enumerate(windows) if drawn.intersects(window)]
+    for k in list(kept):
+        others = [windows[other].buffer(-_EDGE) for other in kept if other != k]
+        if drawn.intersection(windows[k]).difference(shapely.union_all(others)).is_empty:
+            kept.remove(k)
+    return kept
 
 
 def _tiles(size: np.ndarray, inner: np.ndarray, scale: float) -> tuple[np.ndarray, float]:

@@ -8,7 +8,7 @@ from .assembly_order import assembly_steps, fasteners
 from .blanks import Blanks
 from .cutlist import cut_list, totals
 from .cutsheets import Sheet
-from .options import Tolerances
+from .options import Tolerances, tenths
 from .paper import Book
 from .part_pages import cell_pages, plate_pages, sheet_pages, stock_pages, strip_pages
 from .sources import sources
@@ -80,7 +80,7 @@ def _note(blanks: Blanks, tolerances: Tolerances) -> str:
             f"Strips: {board.section} mm {board.material}".rstrip()
             + ". Saw to the cut length; holes are measured from the sawn end of side 1. l1 and l2 "
             "are lengths of the axes from the joint to the corner points, "
-            f"{blanks.corners.setback:.1f} mm beyond either sawn end."
+            f"{tenths(blanks.corners.setback)} mm beyond either sawn end."
         )
     if note := sources(blanks).note:
         lines.append(note)

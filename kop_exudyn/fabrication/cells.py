@@ -25,7 +25,7 @@ from shapely import affinity
 
 from ..kit.kinds import part_kind
 from ..structures.hardware import CellHardware
-from .options import CutOptions
+from .options import CutOptions, tenths
 from .pieces import PartsList, Piece
 from .shapes import Hole, Polyline, Shape, Template, Text
 
@@ -190,7 +190,7 @@ class CellParts:
         height = min(0.6 * t, 1.2 * end / len(arm.label))
         label = f"{arm.label}{number}"
         shapes.append(Text(np.array([length / 2, 0.0]), height, label))
-        name = f"{length:.1f} from pin to pin"
+        name = f"{tenths(length)} from pin to pin"
         board = round(self.width / 2, 6)
         return Template(label, name, arm.count, tuple(shapes), board, arm.by_design)
 
@@ -221,7 +221,7 @@ class CellParts:
             slots.append(affinity.rotate(slot, 120 * k, origin=(0, 0)))
         shapes: list[Shape] = [_outline(shape), *map(_outline, slots)]
         shapes.append(Text(np.zeros(2), min(0.3 * inradius, 5.0), "P"))
-        name = f"edge {edge:.1f}, hinge pins along the edges at the inner face"
+        name = f"edge {tenths(edge)}, hinge pins along the edges at the inner face"
         by_design = tuple(h.plates for h in self.hardware)
         return Template("P", name, self.plates, tuple(shapes), t, by_design)
 

@@ -23,6 +23,12 @@ def millimetres(unit: str) -> float:
     return 1000 * LENGTHS[unit]
 
 
+def tenths(length: float) -> str:
+    """A length (mm) as all files and drawings print it: rounded from thousandths, which tables
+    have, so that 152.6498 is 152.7 wherever it stands."""
+    return f"{round(float(length), 3):.1f}"
+
+
 @dataclass(frozen=True)
 class Tolerances:
     """What the workshop should keep to: length in mm, angle in degrees."""

@@ -23,7 +23,7 @@ from ..files.files import write_bytes
 PAPERS = {"a4": (297.0, 210.0), "a3": (420.0, 297.0)}  # mm, across
 # Millimetres of a thing that one millimetre on paper shows: those that rulers have, and some
 # between: every page has its own bar, and much of a page may stay empty otherwise.
-_STEPS = (1.0, 1.5, 2.0, 2.5, 4.0, 5.0, 7.5)
+_STEPS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 7.5)
 SCALES = (0.1, 0.2, 0.5, *(step * power for power in (1.0, 10.0, 100.0) for step in _STEPS), 1000.0)
 
 _MM = 1 / 25.4
@@ -31,6 +31,7 @@ _BORDER = 10.0  # mm of paper around the frame
 _BLOCK = 16.0  # mm that the title block is high
 _BAR = 60.0  # mm, at most, of the scale bar on paper
 _ROUND = (1, 2, 5)
+_BOUGHT = ("diameter_mm", "joint_hole_mm", "bolt_hole_mm")  # columns of sizes that tools have
 
 
 @dataclass
@@ -121,6 +122,7 @@ class Book:
         heads = [_head(name) for name in columns]
         size, widths = _fitting(heads, cells, Page(self.paper, "").room[0])
         step = 1.9 * size * 25.4 / 72
+        ends = np.array([[0.0, 0.0], [sum(widths), 0.0]])  # of the rules
         number = 0
         while number < len(cells) or number == 0:
             page = self.page(heading)
@@ -132,11 +134,11 @@ class Book:
             lines_high = max(head.count("\n") for head in heads)
             y -= step * 0.75 * lines_high
             _row(page, heads, widths, right, y, size, weight="bold")
-            page.line([[page.low[0], y - step / 3], [page.high[0], y - step / 3]], QUIET)
+            page.line(ends + [page.low[0], y - step / 3], QUIET)
             while number < len(cells) and y - 1.4 * step > page.low[1]:
                 y -= step
                 _row(page, cells[number], widths, right, y, size)
-                page.line([[page.low[0], y - step / 3], [page.high[0], y - step / 3]], FAINT, 0.1)
+                page.line(ends + [page.low[0], y - step / 3], FAINT, 0.1)
                 number += 1
             if not cells:
                 break
@@ -266,18 +268,19 @@ def _head(name: str) -> str:
     """A column's name as people read it: words below each other, the unit last."""
     for unit in ("mm", "deg", "m2", "m"):
         if name.endswith(f"_{unit}"):
-            return name.removesuffix(f"_{unit}").replace("_", "\n") + f"\n[{unit}]"
+            words = name.removesuffix(f"_{unit}").replace("_", "\n")
+            return f"{words}\n[{unit.replace('2', '²')}]"
     return name.replace("_", "\n")
 
 
 def _cell(name: str, value: Any) -> str:
-    """A value as it is printed: 0.1 mm, 0.01 degrees."""
+    """A value as it is printed: 0.1 mm, 0.01 degrees; drills and pins as they are bought."""
     if value is None:
         return ""
-    if isinstance(value, float):
+    if isinstance(value, float) and not name.endswith(_BOUGHT):
         digits = {"mm": 1, "deg": 2, "m": 2, "m2": 3}.get(name.rpartition("_")[2])
         return f"{value:g}" if digits is None else f"{value:.{digits}f}"
-    return str(value)
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _cut(text: str, size: float, room: float) -> str:

@@ -12,6 +12,7 @@ from ..drawing.style import FAINT, INK, QUIET
 from ..wording import counted
 from .blanks import Blanks, CornerPlate, Strip
 from .cutsheets import Sheet
+from .options import tenths
 from .paper import Book, Page, fitting_scale
 from .shapes import CUT, ENGRAVE, NOTES, Hole, Polyline, Shape, Template, Text
 from .stock import StockPlan
@@ -55,7 +56,11 @@ def plate_pages(book: Book, blanks: Blanks) -> None:
     room = Page(book.paper, "").room
     size = np.max([np.ptp(plate.box, axis=0) for plate in plates], axis=0)
     scale = fitting_scale(size, room - [10.0, 20.0])
-    cell = size / scale + [10.0, 16.0]
+    names = [f"{plate.label}: {plate.name}" for plate in plates]
+    numbers = [counted(plate.count, "piece") for plate in plates]
+    offsets = [f"second axis ends {_aside(plate)} mm off the first" for plate in blanks.plates]
+    words = max(text_extent(text, 7.5, "bold")[0] for text in (*names, *offsets))
+    cell = np.maximum(size / scale + [10.0, 20.0], [words + 6.0, 0.0])
     across, down = (max(int(n), 1) for n in room // cell)
     note = blanks.plates[0]
     for first in range(0, len(plates), across * down):
@@ -72,28 +77,16 @@ def plate_pages(book: Book, blanks: Blanks) -> None:
             color=QUIET,
         )
         for k, plate in enumerate(plates[first : first + across * down]):
-            angled = blanks.plates[first + k]
             corner = page.low + cell * [k % across, down - 1 - k // across]
-            at = corner + [cell[0] / 2, 12.0 + size[1] / scale / 2]
+            at = corner + [cell[0] / 2, 15.5 + size[1] / scale / 2]
             _template(page, plate, at - np.mean(plate.box, axis=0) / scale, scale)
-            page.text(
-                corner[0] + cell[0] / 2,
-                corner[1] + 6.0,
-                f"{plate.label}: {plate.name}",
-                7.5,
-                ha="center",
-                va="center",
-                weight="bold",
-            )
-            page.text(
-                corner[0] + cell[0] / 2,
-                corner[1] + 2.5,
-                f"{counted(plate.count, 'piece')}; the second axis ends "
-                f"{_aside(angled)} mm off the first",
-                7,
-                ha="center",
-                va="center",
-            )
+            for text, below, weight in (
+                (names[first + k], 9.5, "bold"),
+                (numbers[first + k], 6.0, "normal"),
+                (offsets[first + k], 2.5, "normal"),
+            ):
+                x, y = corner + [cell[0] / 2, below]
+                page.text(x, y, text, 7.5, ha="center", va="center", weight=weight)
 
 
 def cell_pages(book: Book, blanks: Blanks) -> None:
@@ -136,12 +129,12 @@ def sheet_pages(book: Book, sheets: Sequence[Sheet]) -> None:
         room = Page(book.paper, "").room
         scale = fitting_scale(np.array(sheet.size), room - [0.0, 6.0])
         title = _title([sheets[k].title for k in alike])
-        page = book.page(
-            f"{title}, {sheet.thickness:g} mm thick, {sheet.size[0]:g} x {sheet.size[1]:g} mm",
-            scale,
-        )
+        about = f"{sheet.thickness:g} mm thick, {sheet.size[0]:g} x {sheet.size[1]:g} mm"
+        page = book.page(f"{title[0].upper()}{title[1:]}, {about}", scale)
         for shape in sheet.shapes:
-            if shape.layer != NOTES or (isinstance(shape, Polyline) and shape.closed):
+            if isinstance(shape, Text) and shape.layer != NOTES:
+                _text(page, shape, page.low, scale, INK)
+            elif shape.layer != NOTES or (isinstance(shape, Polyline) and shape.closed):
                 _shape(page, shape, page.low, scale)
 
 
@@ -192,7 +185,7 @@ def stock_pages(book: Book, blanks: Blanks, plan: StockPlan | None) -> None:
                 edgecolor=INK,
                 lw=0.6,
             )
-            text = f"{label}  {length:.1f}"
+            text = f"{label}  {tenths(length)}"
             if text_extent(text, 6.5)[0] > step - 1:
                 text = label
             page.text(x + step / 2, y + 1.9, text, 6.5, ha="center", va="center")
@@ -245,15 +238,15 @@ def _strip(page: Page, strip: Strip, at: np.ndarray, scale: float) -> None:
     joint = (
         f"joint hole {strip.hole:g} mm"
         if strip.slot is None
-        else f"slot {strip.slot:.1f} mm wide, {strip.slot_depth:.1f} mm deep"
+        else f"slot {tenths(strip.slot)} mm wide, {tenths(strip.slot_depth)} mm deep"
     )
-    adapts = f"; sides {strip.slide:.1f} mm adjustable" if strip.slide else ""
+    adapts = f"; sides {tenths(strip.slide)} mm adjustable" if strip.slide else ""
     page.text(at[0], top + 2.0, f"{strip.label}", 10, weight="bold")
     page.text(
         at[0] + 14.0,
         top + 2.0,
         f"{counted(strip.count, 'piece')}, {strip.board.section} mm: "
-        f"{strip.cut_length:.1f} long, {joint}, bolt holes {strip.bolt_hole:g} mm{adapts}",
+        f"{tenths(strip.cut_length)} long, {joint}, bolt holes {strip.bolt_hole:g} mm{adapts}",
         8,
     )
     stations = [0.0, *strip.bolt_stations, strip.hole_from_end, strip.cut_length]
@@ -268,7 +261,7 @@ def _strip(page: Page, strip: Strip, at: np.ndarray, scale: float) -> None:
         page.text(
             x,
             at[1] - 7.5,
-            f"{station:.1f}",
+            tenths(station),
             _DIMENSION,
             rotation=90,
             ha="center",
@@ -322,8 +315,8 @@ def _text(page: Page, shape: Text, origin: np.ndarray, scale: float, colour: str
 def _aside(plate: CornerPlate) -> str:
     """How far the end of a plate's second axis is off the line of the first: to lay it out by a
     square instead of by degrees."""
-    return f"{abs(plate.leg * np.sin(plate.angle)):.1f}"
+    return tenths(abs(plate.leg * np.sin(plate.angle)))
 
 
 def _list(values: Sequence[float]) -> str:
-    return " and ".join(f"{value:.1f}" for value in values)
+    return " and ".join(tenths(value) for value in values)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .blanks import Blanks, CornerPlate, Strip
+from .options import tenths
 from .shapes import ENGRAVE, Hole, Polyline, Shape, Template, Text, rectangle
 
 _ARC = 12  # chords of half a circle at a slide's end
@@ -55,7 +56,7 @@ def strip_template(strip: Strip) -> Template:
         Text(np.array([joint, 0.5 * free - half]), height, strip.label),
         Text(np.array([reach + 0.6 * height, -0.5 * half]), 0.8 * height, "1"),
     ]
-    name = f"{length:.1f} long, joint {joint:.1f} from end 1"
+    name = f"{tenths(length)} long, joint {tenths(joint)} from end 1"
     return Template(strip.label, name, strip.count, tuple(shapes), strip.board.thickness)
 
 
@@ -112,7 +113,7 @@ def plate_template(plate: CornerPlate) -> Template:
         Polyline(axis, False, ENGRAVE),
         text,
     )
-    name = f"{np.degrees(angle):.2f} deg, legs {leg:.1f}"
+    name = f"{np.degrees(angle):.2f} deg, legs {tenths(leg)}"
     return Template(plate.label, name, plate.count, shapes, plate.board.thickness)
 
 
@@ -121,4 +122,4 @@ def bar_template(label: str, length: float, count: int, blanks: Blanks) -> Templ
     half = blanks.board.breadth / 2
     height = min(blanks.board.breadth / 2, 1.2 * length / len(label))
     shapes = (rectangle(0.0, -half, length, half), Text(np.array([length / 2, 0.0]), height, label))
-    return Template(label, f"{length:.1f} long", count, shapes, blanks.board.thickness)
+    return Template(label, f"{tenths(length)} long", count, shapes, blanks.board.thickness)

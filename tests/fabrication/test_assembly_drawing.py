@@ -267,3 +267,10 @@ def test_joints_of_cells_are_drawn_between_their_plates(name, repository):
     # a joint stands in the gap between two plates, or at a plate's free edge
     assert np.linalg.norm(drawing.joints, axis=1).max() < 0.6 * np.hypot(*np.ptp(
         drawing.cells.reshape(-1, 2), axis=0))  # fmt: skip
+    # and the name of a cell in the middle of its plate: arms, which aren't drawn, pushed it aside
+    labels, places, crowded = drawing.labels(drawing.scale)
+    names = {label.text: at for label, at in zip(labels, places) if "\n" in label.text}
+    assert len(names) == len(drawing.cells) and not crowded
+    for text, at in names.items():
+        middle = drawing.cells[int(text.split("\n")[1]) - 1].mean(axis=0) / drawing.scale
+        np.testing.assert_allclose(at, middle, atol=1e-9)

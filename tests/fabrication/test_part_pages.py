@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kop_exudyn.drawing.labels import text_extent
 from kop_exudyn.fabrication.blanks import Blanks
+from kop_exudyn.fabrication.cutlist import _mm
 from kop_exudyn.fabrication.cutsheets import cut_sheets
-from kop_exudyn.fabrication.options import CutOptions
-from kop_exudyn.fabrication.paper import PAPERS, SCALES, Book, Page
+from kop_exudyn.fabrication.options import CutOptions, tenths
+from kop_exudyn.fabrication.paper import PAPERS, SCALES, Book, Page, _cell, _head
 from kop_exudyn.fabrication.part_pages import plate_pages, sheet_pages, stock_pages, strip_pages
 from kop_exudyn.fabrication.shapes import CUT, Text
 from kop_exudyn.fabrication.stock import Bar, StockPlan
@@ -62,8 +64,8 @@ def test_sheets_that_are_alike_are_on_one_page(parts):
     sheet_pages(book, [first, last, other])
     headings = [page.heading for page in book.pages]
     assert len(headings) == 2
-    assert headings[0].startswith("cut sheets 1 to 2 of 3, alike, ")
-    assert headings[1].startswith("cut sheet 3 of 3, ")
+    assert headings[0].startswith("Cut sheets 1 to 2 of 3, alike, ")
+    assert headings[1].startswith("Cut sheet 3 of 3, ")
 
 
 def test_plates_can_be_laid_out_by_a_square(parts):
@@ -71,7 +73,35 @@ def test_plates_can_be_laid_out_by_a_square(parts):
     plate_pages(book, blanks)
     for plate in blanks.plates:
         aside = abs(plate.leg * np.sin(plate.angle))
-        assert any(f"the second axis ends {aside:.1f} mm off the first" in t for t in texts(book))
+        assert f"second axis ends {tenths(aside)} mm off the first" in texts(book)
+
+
+@pytest.mark.parametrize("paper", PAPERS)
+def test_what_is_said_of_plates_neither_overlaps_nor_leaves_the_page(parts, paper):
+    """Short plates had their captions over each other, and beyond the page's frame."""
+    book = Book(paper, "kit")
+    plate_pages(book, Blanks(parts, "m"))
+    for page in book.pages:
+        boxes = []
+        for text in page.ax.texts:
+            width, height = text_extent(text.get_text(), text.get_size(), text.get_weight())
+            x, y = text.get_position()
+            x -= width / 2 if text.get_ha() == "center" else 0.0
+            y -= height if text.get_va() == "top" else height / 2
+            boxes.append((x, y, x + width, y + height))
+        boxes = np.array(boxes)
+        assert (boxes[:, :2] >= page.low - 1.0).all() and (boxes[:, 2:] <= page.high + 1.0).all()
+        apart = (boxes[:, None, :2] >= boxes[None, :, 2:]).any(axis=2)
+        assert (apart | apart.T | np.eye(len(boxes), dtype=bool)).all()
+
+
+def test_a_length_has_the_same_digits_wherever_it_is_printed():
+    """152.6498 was 152.7 in the list, which rounds from thousandths, and 152.6 on the drawing."""
+    for length in (152.6498, 152.6500001, 152.65, 0.0501, 99.95):
+        assert tenths(length) == _cell("cut_length_mm", _mm(length))
+    assert _cell("diameter_mm", 0.75) == "0.75"  # a drill of 0.8 would be another one
+    assert _cell("joint_hole_mm", 6.0) == "6"
+    assert _head("area_m2") == "area\n[m²]"
 
 
 def test_names_on_strips_keep_off_their_joint_holes(parts):
