@@ -1,8 +1,17 @@
-"""Numbers of things in sentences: one curve, two curves."""
+"""Numbers in sentences: one curve, two curves; and beside their units."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
+
+from .units import FORCES, LENGTHS
+
+# Between a number (or the kind of one) and its unit, which no line's end may part.
+_NUMBER_UNIT = re.compile(
+    r"(?:(?<=\d)|(?<=max)|(?<=mean)) "
+    rf"(?=(?:%|°|{'|'.join([*LENGTHS, *FORCES])}|[kMG]?Pa|m?J|kJ|MJ|s|degrees|deg)(?![\w/]))"
+)
 
 
 def counted(number: int, one: str, many: str | None = None) -> str:
@@ -21,3 +30,8 @@ def counted_parts(sizes: Mapping[str, int]) -> str:
     """
     each = " and ".join(f"{number:,} {kind}" for kind, number in sizes.items())
     return f"{each} part{'s' * (sum(sizes.values()) != 1)}"
+
+
+def beside_units(text: str) -> str:
+    """The text with spaces before units at which no line breaks."""
+    return _NUMBER_UNIT.sub("\N{NO-BREAK SPACE}", text)

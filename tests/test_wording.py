@@ -1,6 +1,6 @@
 """One curve, two curves."""
 
-from kop_exudyn.wording import counted, counted_parts
+from kop_exudyn.wording import beside_units, counted, counted_parts
 
 
 def test_one_and_several():
@@ -13,3 +13,7 @@ def test_sizes_of_kits():
     assert counted_parts({"linear": 12, "angular": 5}) == "12 linear and 5 angular parts"
     assert counted_parts({"linear": 1, "angular": 1}) == "1 linear and 1 angular parts"
     assert counted_parts({"cell": 1}) == "1 cell part"
+
+
+def test_numbers_stay_beside_their_units():
+    assert beside_units("max 36 % of 4.5 mm, 3 parts") == "max 36\xa0% of 4.5\xa0mm, 3 parts"

@@ -4,7 +4,6 @@ script."""
 from __future__ import annotations
 
 import base64
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -18,13 +17,9 @@ from matplotlib.figure import Figure
 from ..drawing.style import figure_bytes
 from ..files.files import write_text
 from ..files.json_files import to_json
-from ..units import FORCES, LENGTHS, plain_number
+from ..units import plain_number
+from ..wording import beside_units
 
-# Between a number (or the kind of one) and its unit, which no line's end may part.
-_NUMBER_UNIT = re.compile(
-    r"(?:(?<=\d)|(?<=max)|(?<=mean)) "
-    rf"(?=(?:%|°|{'|'.join([*LENGTHS, *FORCES])}|[kMG]?Pa|m?J|kJ|MJ|s|degrees|deg)(?![\w/]))"
-)
 _MEDIA = {"svg": "image/svg+xml", "png": "image/png"}
 
 
@@ -196,7 +191,7 @@ class Page:
 
 def _text(text: str) -> str:
     """Plain text as HTML has it; numbers stay beside their units."""
-    return escape(_NUMBER_UNIT.sub("\N{NO-BREAK SPACE}", text))
+    return escape(beside_units(text))
 
 
 def shown(value: Any) -> str:

@@ -23,6 +23,7 @@ from scipy.spatial.transform import Rotation
 
 from ..drawing.colours import value_colours
 from ..files.files import write_text
+from ..wording import beside_units
 
 _SCALE_STEPS = 12
 # ends of colour scales; their quarters have few digits
@@ -232,7 +233,7 @@ def _state(state: ViewerState) -> dict[str, Any]:
         "opening": state.opening,
         "final": state.final,
         "placed": state.placed,
-        "note": state.note,
+        "note": beside_units(state.note),
         "places": _floats(state.positions),
         "turns": _floats(Rotation.from_matrix(state.rotations).as_quat()),
         "joints": _floats(state.joints),
