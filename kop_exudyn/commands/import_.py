@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ..exchange.drawing import Finding
     from ..exchange.drawn_networks import DrawnNetwork, ReadingOptions
     from ..exchange.imports import Imported
+    from ..structures.nets import NetClass
     from ..units import Units
 
 HELP = "turn a drawing, a surface or a released umbrella mesh into a design file"
@@ -50,7 +51,16 @@ EXAMPLES = """examples:
   kop import shell_mm.json --unit m --out shell_m.json
   kop import hemisphere_5t.json.gz --out hemisphere.json --plates rigid"""  # noqa: E501  # a command on one line can be copied
 
-_CLASSES = ("c_shell", "grid", "umbrella")
+
+class _Classes(Iterable[str]):
+    """Names of all structure classes, looked up where they are needed only: that takes a while."""
+
+    def __iter__(self) -> Iterator[str]:
+        from ..structures.base import class_names
+
+        return iter(class_names())
+
+
 # What an option that a design needs is, with an example.
 _NEEDED = {
     "opening": ": the angle that it opens by, as 35deg",
@@ -77,8 +87,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--as",
         dest="kind",
-        choices=_CLASSES,
-        help="class of the design (default: c_shell of drawings, umbrella of others)",
+        choices=_Classes(),
+        metavar="CLASS",
+        help="class of the design: %(choices)s (default: c_shell of drawings, umbrella of others)",
     )
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist")
     shell = parser.add_argument_group(
@@ -239,6 +250,7 @@ def run(args: argparse.Namespace) -> int:
     from ..exchange.other_formats import instead_of
     from ..files.files import check_output_file
     from ..geometry.mesh_files import MESH_SUFFIXES
+    from ..structures.nets import net_class, net_classes
 
     if os.path.isdir(args.file):
         raise InputError("is a folder, expected a file", source=args.file)
@@ -266,19 +278,27 @@ def run(args: argparse.Namespace) -> int:
             field="--as",
             value=wanted,
         )
+    net = net_class(wanted)
+    if net is None:
+        raise InputError(
+            f"designs of this class aren't made of drawings (known: {', '.join(net_classes())})",
+            source=args.file,
+            field="--as",
+            value=wanted,
+        )
     check_options(args, wanted)
-    return _drawing(args, wanted)
+    return _drawing(args, wanted, net)
 
 
-def _drawing(args: argparse.Namespace, wanted: str) -> int:
-    """A C-shell or a grid of a drawn net; its preview also where no design comes of it."""
+def _drawing(args: argparse.Namespace, wanted: str, net: NetClass) -> int:
+    """A design of a drawn net; its preview also where no design comes of it."""
     from ..errors import InputError
     from ..exchange.imports import read_scaled
     from ..exchange.space_nets import with_heights_checked
     from ..units import Units
 
     if args.out is not None:
-        _require(args, wanted, *(["opening"] * (wanted == "c_shell")), "section", "material")
+        _require(args, net, *net.needed, "section", "material")
     units = None if args.unit is None else Units(args.unit, args.force_unit)
     drawn, units = read_scaled(args.file, _reading(args), args.scale, units, space=True)
     if units is not None:
@@ -299,7 +319,7 @@ def _drawing(args: argparse.Namespace, wanted: str) -> int:
         _write(args, made)
     if args.preview is not None:
         _save_preview(args, drawn, findings, units)
-    _tell(args, wanted, drawn, findings, units)
+    _tell(args, wanted, net, drawn, findings, units)
     return 0
 
 
@@ -307,23 +327,12 @@ def _made(
     args: argparse.Namespace, wanted: str, drawn: DrawnNetwork, units: Units | None
 ) -> Imported:
     from ..exchange.design_data import Rods
-    from ..exchange.imports import import_c_shell, import_grid
+    from ..exchange.imports import import_net
 
     rods = Rods(_section(args), _material(args), units)
     name = args.file.stem
-    if wanted == "c_shell":
-        return import_c_shell(drawn, name, rods, args.opening, args.out, args.target)
     own = args.out.with_name(f"{args.out.stem}_surface.obj")
-    return import_grid(
-        drawn,
-        name,
-        rods,
-        args.out,
-        args.surface,
-        chart=args.chart,
-        held=args.held,
-        mesh_file=own,
-    )
+    return import_net(drawn, wanted, name, rods, args.out, {**vars(args), "mesh_file": own})
 
 
 def _reading(args: argparse.Namespace) -> ReadingOptions:
@@ -373,6 +382,7 @@ def _save_preview(
 def _tell(
     args: argparse.Namespace,
     wanted: str,
+    net: NetClass,
     drawn: DrawnNetwork,
     findings: Sequence[Finding],
     units: Units | None,
@@ -390,17 +400,19 @@ def _tell(
         "summary": figures,
         "findings": told,
     }
-    opening = args.opening if wanted == "c_shell" else None
+    opening = args.opening if "opening" in net.options else None
     tell(args, data, import_rows(figures, list(findings), units, opening))
 
 
-def _require(args: argparse.Namespace, wanted: str, *names: str) -> None:
+def _require(args: argparse.Namespace, net: NetClass, *names: str) -> None:
     from ..errors import InputError
 
-    what = {"c_shell": "a C-shell", "grid": "a grid"}[wanted]
     for name in names:
         if getattr(args, name) is None:
-            raise InputError(f"{what} needs --{name}{_NEEDED[name]}", source=args.file)
+            raise InputError(
+                f"{net.one} needs --{name.replace('_', '-')}{_NEEDED.get(name, '')}",
+                source=args.file,
+            )
 
 
 def _section(args: argparse.Namespace) -> dict[str, Any]:

@@ -6,21 +6,16 @@ import argparse
 
 # What is imported, as messages call it.
 _IMPORTS = {
-    "c_shell": "drawings of C-shells",
-    "grid": "drawings of grids",
+    "drawing": "drawings",
     "patch": "surfaces with --patch",
     "release": "released umbrella meshes",
     "design": "design files, which are written in other units",
 }
-_DRAWINGS = ("c_shell", "grid")
+_DRAWINGS = ("drawing",)
 _UMBRELLAS = ("patch", "release")
-# The imports that each option is for; those that aren't here are for all.
+# The imports that each option is for; those that aren't here are for all, or for drawings of the
+# classes that say so.
 _FOR = {
-    "opening": ("c_shell",),
-    "target": ("c_shell",),
-    "surface": ("grid",),
-    "chart": ("grid",),
-    "held": ("grid",),
     "patch": ("patch",),
     "plate_edge": ("patch",),
     "plates": _UMBRELLAS,
@@ -48,14 +43,22 @@ _FOR = {
 def check_options(args: argparse.Namespace, what: str) -> None:
     """Refuse options that are for other imports.
 
-    what : of `_IMPORTS`, what is imported
+    what : of `_IMPORTS`, or the class that a drawing becomes
     Raises InputError naming the first of them, and what it is for.
     """
     from ..errors import InputError
+    from ..structures.nets import net_classes
 
-    for option, imports in _FOR.items():
-        if what not in imports and getattr(args, option) != args.command.get_default(option):
-            *most, last = (_IMPORTS[i] for i in imports)
+    nets = net_classes()
+    names = _IMPORTS | {name: f"drawings of {net.many}" for name, net in nets.items()}
+    of_classes: dict[str, tuple[str, ...]] = {}
+    for name, net in nets.items():
+        for option in net.options:
+            of_classes[option] = (*of_classes.get(option, ()), name)
+    own = {what, "drawing"} if what in nets else {what}
+    for option, imports in {**of_classes, **_FOR}.items():
+        if own.isdisjoint(imports) and getattr(args, option) != args.command.get_default(option):
+            *most, last = (names[i] for i in imports)
             which = f"{', '.join(most)} and {last}" if most else last
             raise InputError(
                 f"isn't for this import: it is for {which}",

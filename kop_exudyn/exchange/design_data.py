@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..files.documents import check_schema
+from ..files.documents import check_schema, has_schema
 from ..io.designs import DESIGN_VERSION
 from ..rods.sections import material_from_dict
 from ..structures.plausibility import material_doubts, section_doubt
@@ -29,55 +29,29 @@ class Rods:
     units: Units | None = None
 
 
-def c_shell_data(
-    name: str,
-    curves: Sequence[Mapping[str, Any]],
-    rods: Rods,
-    opening: float,
-    *,
-    free_ends: bool = False,
-    target: Mapping[str, Any] | None = None,
+def design_data(
+    class_name: str, name: str, rods: Rods, content: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """The content of a C-shell's design file, see c_shell.schema.json.
+    """The content of a design file.
 
-    target : its field of that name
+    class_name, name : of the design
+    content : the class's own fields
 
     Raises InputError for values that can't be.
     """
-    data = _head("c_shell", name, rods) | {
-        "curves": list(curves),
-        "crossings": "find",
-        "free_ends": free_ends,
-        "opening": {"angle": opening},
+    units = {} if rods.units is None else {"units": rods.units.to_dict()}
+    data = {
+        "format": "kop_exudyn/design",
+        "version": DESIGN_VERSION,
+        "class": class_name,
+        "name": name,
+        **units,
+        "material": dict(rods.material),
+        "section": dict(rods.section),
+        **content,
     }
-    if target is not None:
-        data["target"] = dict(target)
-    check_schema(data, "c_shell")
-    return data
-
-
-def grid_data(
-    name: str,
-    curves: Sequence[Mapping[str, Any]],
-    rods: Rods,
-    surface: Mapping[str, Any],
-    held: str | Sequence[int] | None = None,
-) -> dict[str, Any]:
-    """The content of a grid's design file, see grid.schema.json: curves in the parameters of a
-    mesh.
-
-    surface : its field of that name
-    held : joints that keep their places, see `Grid`
-
-    Raises InputError for values that can't be.
-    """
-    data = _head("grid", name, rods) | {
-        "surface": dict(surface),
-        "network": {"type": "curves", "curves": list(curves)},
-    }
-    if held is not None:
-        data["held"] = held
-    check_schema(data, "grid")
+    if has_schema(class_name):
+        check_schema(data, class_name)
     return data
 
 
@@ -93,19 +67,6 @@ def mesh_target(file: str, frame: Frame, scale: float) -> dict[str, Any]:
     if not frame.standard:
         target |= {"origin": frame.origin.tolist(), "axes": frame.axes.tolist()}
     return target
-
-
-def _head(kind: str, name: str, rods: Rods) -> dict[str, Any]:
-    units = {} if rods.units is None else {"units": rods.units.to_dict()}
-    return {
-        "format": "kop_exudyn/design",
-        "version": DESIGN_VERSION,
-        "class": kind,
-        "name": name,
-        **units,
-        "material": dict(rods.material),
-        "section": dict(rods.section),
-    }
 
 
 def rod_doubts(rods: Rods, spans: np.ndarray) -> list[str]:

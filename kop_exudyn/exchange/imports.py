@@ -1,11 +1,12 @@
-"""Drawings as designs: the files of the two classes that are made of drawn nets, with what a reader
+"""Drawings as designs: the files of the classes that are made of drawn nets, with what a reader
 should know about each step."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,11 @@ import numpy as np
 
 from ..errors import InputError
 from ..geometry.mesh_surface import MeshSurface, load_mesh_surface
-from ..structures.base import design_from_dict
+from ..structures.base import Design, design_from_dict
+from ..structures.nets import NetClass, net_class, net_classes
 from ..units import LENGTHS, Units
 from .curve_files import read_drawing
-from .design_data import Rods, c_shell_data, grid_data, mesh_target, rod_doubts
+from .design_data import Rods, design_data, mesh_target, rod_doubts
 from .drawing import Drawing, Finding, size_of
 from .drawn_networks import DrawnNetwork, ReadingOptions, drawn_network
 from .frames import Frame
@@ -93,61 +95,83 @@ def _size_doubts(drawn: DrawnNetwork, units: Units | None) -> list[Finding]:
     return [Finding("suspicious", text)]
 
 
-def import_c_shell(
-    drawn: DrawnNetwork, name: str, rods: Rods, opening: float, out: Path, target: Path | None
+def import_net(
+    drawn: DrawnNetwork,
+    class_name: str,
+    name: str,
+    rods: Rods,
+    out: Path,
+    options: Mapping[str, Any],
 ) -> Imported:
-    """A C-shell of a net that is flat, or can be laid flat.
+    """A design of a drawn net.
 
-    opening : rad
-    out : where the design will be written; target : mesh to keep to, in the drawing's coordinates
+    class_name : one of `net_classes`
+    name : of the design
+    out : where the design will be written
+    options : by name; of classes in a plane "target" (a mesh file in the drawing's coordinates, or
+        None), of classes on surfaces "surface" (such a file; None: the surface through a net in
+        space), "chart" ("plane": curves are taken in plan; "conformal": they are drawn in space on
+        the surface) and "mesh_file", where the net's own surface will be written; and those that
+        the class asks for
 
     Raises InputError, naming the drawing's curves, where no design comes of it.
     """
+    net = net_class(class_name)
+    if net is None:
+        raise InputError(
+            f"isn't made of drawings (known: {', '.join(net_classes())})",
+            field="--as",
+            value=class_name,
+        )
+    make = _in_plane if net.on_surface is None else _on_surface
+    return make(drawn, class_name, net, name, rods, out, options)
+
+
+def _in_plane(
+    drawn: DrawnNetwork,
+    class_name: str,
+    net: NetClass,
+    name: str,
+    rods: Rods,
+    out: Path,
+    options: Mapping[str, Any],
+) -> Imported:
+    """Of a net that is flat, or can be laid flat."""
     frame = replace(drawn.frame, origin=drawn.frame.origin + drawn.origin)
     if not drawn.frame.flat:
         drawn, frame = laid_flat(drawn), Frame(drawn.origin, np.eye(3), 0.0)
     findings = drawn.findings + _doubts(drawn, rods)
     goal = None
-    if target is not None:
-        goal = mesh_target(relative(target, out), frame, drawn.options.scale)
-    free = drawn.options.free_ends
-    data = c_shell_data(name, drawn.entries, rods, opening, free_ends=free, target=goal)
-    data |= drawn.placed
+    if options["target"] is not None:
+        goal = mesh_target(relative(options["target"], out), frame, drawn.options.scale)
+    own = {**options, "target": goal, "free_ends": drawn.options.free_ends}
+    data = design_data(class_name, name, rods, net.content(drawn.entries, own)) | drawn.placed
     _check(drawn, data, out)
     return Imported(data, drawn, findings)
 
 
-def import_grid(
+def _on_surface(
     drawn: DrawnNetwork,
+    class_name: str,
+    net: NetClass,
     name: str,
     rods: Rods,
     out: Path,
-    surface: Path | None,
-    *,
-    chart: str = "plane",
-    held: str | Sequence[int] | None = None,
-    mesh_file: Path | None = None,
+    options: Mapping[str, Any],
 ) -> Imported:
-    """A grid over a net: drawn in plan or in space, on a surface or on the net's own.
-
-    out : where the design will be written
-    surface : mesh file, in the drawing's coordinates; None: the surface through a net in space
-    chart : "plane": curves are taken in plan; "conformal": they are drawn in space on the surface
-    mesh_file : where the net's own surface will be written
-
-    Raises InputError, naming the drawing's curves, where no design comes of it.
-    """
-    scale, meshes = drawn.options.scale, {}
+    """Over a net drawn in plan or in space, on a surface or on the net's own."""
+    scale, surface, chart = drawn.options.scale, options["surface"], options["chart"]
+    meshes = {}
     if surface is None:
         if drawn.frame.flat:
             raise InputError(
-                "a grid needs --surface: the net is drawn flat and says nothing of the shape"
+                f"{net.one} needs --surface: the net is drawn flat and says nothing of the shape"
             )
-        assert mesh_file is not None
         drawn = with_heights_checked(drawn)
         vertices, faces, up = surface_through(drawn)
-        meshes[mesh_file] = (vertices + scale * drawn.origin, faces)
-        where: dict[str, Any] = {"type": "mesh", "file": relative(mesh_file, out), "up": up}
+        meshes[options["mesh_file"]] = (vertices + scale * drawn.origin, faces)
+        file = relative(options["mesh_file"], out)
+        where: dict[str, Any] = {"type": "mesh", "file": file, "up": up}
         mesh = MeshSurface(vertices, faces, "plane", up)
     else:
         where = {"type": "mesh", "file": relative(surface, out)}
@@ -162,8 +186,10 @@ def import_grid(
         if chart == "conformal":
             drawn = replace(drawn, entries=_in_chart(drawn, mesh))
     findings = drawn.findings + _doubts(drawn, rods)
-    data = grid_data(name, drawn.entries, rods, where, held) | drawn.placed
-    _check(drawn, data, out, mesh if meshes else None)
+    own = net.content(drawn.entries, {**options, "surface": where})
+    data = design_data(class_name, name, rods, own) | drawn.placed
+    assert net.on_surface is not None
+    _check(drawn, data, out, partial(net.on_surface, mesh) if meshes else None)
     return Imported(data, drawn, findings, meshes)
 
 
@@ -185,19 +211,20 @@ def _doubts(drawn: DrawnNetwork, rods: Rods) -> list[Finding]:
 
 
 def _check(
-    drawn: DrawnNetwork, data: dict[str, Any], out: Path, mesh: MeshSurface | None = None
+    drawn: DrawnNetwork,
+    data: dict[str, Any],
+    out: Path,
+    make: Callable[[Mapping[str, Any]], Design] | None = None,
 ) -> None:
     """Raise InputError, in the drawing's words, where no design can be made of the content.
 
-    mesh : the surface, where its file isn't written yet
+    make : makes it where the surface's file isn't written yet; None: as any file is read
     """
     try:
-        if mesh is None:
+        if make is None:
             design_from_dict(data, str(out))
         else:
-            from ..structures.grid.design import grid_on
-
-            grid_on(mesh, data)
+            make(data)
     except InputError as error:
         named = drawn.named(error)
         for field in ("surface", "target"):  # files of their own

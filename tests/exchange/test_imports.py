@@ -1,6 +1,7 @@
 """``kop import`` of drawings: units, scales, placements of targets, surfaces, previews, doubts."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from kop_exudyn.exchange.drawn_networks import ReadingOptions, drawn_network
 from kop_exudyn.exchange.export import export_simulation
 from kop_exudyn.exchange.space_nets import surface_through, with_heights_checked
 from kop_exudyn.io.designs import load_design
+from kop_exudyn.structures import base, nets
 
 RODS = ("--section", "0.03,0.004", "--material", "2.1e9,0.35")
 SHELL = (*RODS, "--opening", "30deg")
@@ -320,3 +322,50 @@ class TestLaidFlat:
         status, _, error = imported(capsys, path, "--out", out, *SHELL)
         assert status == 2 and "can't be laid flat: lengths would change by up to" in error
         assert not out.exists()
+
+
+class TestAClassFromOutside:
+    """What a class registers is all that `kop import` needs to make designs of drawings."""
+
+    @pytest.fixture(autouse=True)
+    def toy(self, monkeypatch):
+        base.class_names()  # those that there are, before what is registered meanwhile is lost
+        nets.net_classes()
+        for registry in (base.CLASSES, nets.NETS):
+            monkeypatch.setattr(registry, "items", dict(registry.items))
+        base.register_class("toy")(lambda data, source: SimpleNamespace(middle=np.zeros(3)))
+        nets.register_net(
+            "toy",
+            nets.NetClass(
+                "a toy",
+                "toys",
+                lambda curves, options: {"strings": len(curves), "angle": options["opening"]},
+                options=("opening",),
+                needed=("opening",),
+            ),
+        )
+
+    def test_its_fields_are_written(self, corpus, tmp_path, capsys):
+        out = tmp_path / "toy.json"
+        options = ("--as", "toy", "--out", out, *SHELL)
+        assert imported(capsys, corpus / "unit_m.dxf", *options)[0] == 0
+        data = json.loads(out.read_text())
+        assert (data["class"], data["name"]) == ("toy", "unit_m") and data["strings"] >= 4
+        assert data["angle"] == pytest.approx(np.pi / 6)
+        assert data["section"]["height"] == 0.004 and data["units"]["length"] == "m"
+
+    def test_its_options_are_its_own(self, corpus, tmp_path, capsys):
+        net, out = corpus / "unit_m.dxf", ("--out", tmp_path / "toy.json")
+        status, _, told = imported(capsys, net, "--as", "toy", *out, *RODS)
+        assert status == 2 and "a toy needs --opening" in told
+        status, _, told = imported(capsys, net, "--as", "toy", *out, *SHELL, "--held", "corners")
+        assert status == 2 and "--held" in told and "it is for drawings of grids" in told
+        status, _, told = imported(capsys, net, "--as", "grid", *out, *SHELL)
+        assert status == 2 and "--opening" in told
+        assert "it is for drawings of C-shells and drawings of toys" in told
+
+    def test_classes_that_are_not_drawn_are_named(self, corpus, tmp_path, capsys):
+        del nets.NETS.items["toy"]
+        out = ("--out", tmp_path / "toy.json")
+        status, _, told = imported(capsys, corpus / "unit_m.dxf", "--as", "toy", *out, *SHELL)
+        assert status == 2 and "aren't made of drawings (known: c_shell, grid)" in told

@@ -1,3 +1,3 @@
 """C-shells: planar networks of curved rods that open into space."""
 
-from . import design  # noqa: F401  # registers the class
+from . import design, net  # noqa: F401  # register the class and its import

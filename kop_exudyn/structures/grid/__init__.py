@@ -1,3 +1,3 @@
 """Orthogonal grids: lamellas on surfaces, joined at right angles to them."""
 
-from . import design  # noqa: F401  # registers the class
+from . import design, net  # noqa: F401  # register the class and its import
