@@ -1,7 +1,9 @@
 """The package's public names: all there, and none of them loaded before it is used."""
 
 import ast
+import inspect
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -20,6 +22,19 @@ def test_import_loads_no_library():
     code = f"import sys, kop_exudyn; print(*(m for m in {libraries} if m in sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""
+
+
+def test_docstrings_tell_every_parameter():
+    """Of each public function, and of the fields that results and settings are made of."""
+    for name in set(kop_exudyn.__all__) - {"__version__", "InputError", "SimulationFailure"}:
+        thing = getattr(kop_exudyn, name)
+        told = " ".join(filter(None, (inspect.getdoc(thing), inspect.getdoc(thing.__init__))))
+        missing = [
+            parameter
+            for parameter in inspect.signature(thing).parameters
+            if parameter not in ("args", "kwargs") and not re.search(rf"\b{parameter}\b", told)
+        ]
+        assert missing == [], name
 
 
 def test_unknown_names():

@@ -44,7 +44,12 @@ class Spread:
 
 
 def predicted_spread(design: Design, evaluation: Evaluation, tolerance: Tolerance) -> Spread:
-    """The joints' displacements to first order: no equilibrium is solved."""
+    """The joints' displacements to first order: no equilibrium is solved.
+
+    design : as it was designed
+    evaluation : of its parameters, with its states
+    tolerance : standard deviations of the errors, lengths in the design's unit and angles in rad
+    """
     rows = joint_jacobian(design, evaluation) * tolerance.deviations(design)
     variance = np.sum(rows.reshape(-1, 3, rows.shape[1]) ** 2, axis=(1, 2))
     return Spread(np.sqrt(variance), evaluation.fit.size)
@@ -54,7 +59,10 @@ def shares_by_kind(
     design: Design, evaluation: Evaluation, tolerance: Tolerance
 ) -> Mapping[str, float]:
     """kind -> its share of the joints' mean square displacement, to first order; they sum to
-    one."""
+    one.
+
+    design, evaluation, tolerance : as of `predicted_spread`
+    """
     rows = joint_jacobian(design, evaluation) * tolerance.deviations(design)
     by_parameter = np.sum(rows**2, axis=0)
     total = by_parameter.sum()

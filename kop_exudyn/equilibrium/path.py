@@ -151,6 +151,7 @@ def trace_path(
         torque); from a state, default the scene's initial one, a stable equilibrium at the factor
         is looked for first
     direction : 1 to start towards larger factors, -1 towards smaller ones
+    options : how far and how finely the path is followed
 
     Raises SimulationFailure when no start is found, when the path is lost or doesn't end in time.
     """

@@ -83,6 +83,8 @@ def export_simulation(
 ) -> list[Path]:
     """Write a simulated design's states, the one under its loads included; returns their paths.
 
+    result : of `simulate`
+    folder : made where it isn't there yet
     formats : as of `export_desk`
 
     Raises InputError when a file exists already and `overwrite` is false, or for unknown formats.

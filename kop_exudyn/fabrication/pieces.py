@@ -172,6 +172,8 @@ def parts_list(
 def parts_list_of(result: KitResult) -> PartsList:
     """The pieces of a kit optimisation's final designs, in the states that they are built in.
 
+    result : of a search, or read from a finished run's folder
+
     The deployed states lie where their joints fit the target best. The input design's states stand
     in where no equilibrium of the assigned design was found.
     """

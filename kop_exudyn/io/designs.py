@@ -25,6 +25,8 @@ DESIGN_VERSION = 2
 def load_design(path: str | Path) -> Design:
     """The design that a file describes: our own format, or one that a structure class knows.
 
+    path : of a file .json or .json.gz
+
     Raises InputError naming the file, the field and the value when anything is wrong with it.
     """
     data = read_json(path)

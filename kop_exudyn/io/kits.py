@@ -20,7 +20,12 @@ KIT_VERSION = 1
 
 
 def load_kit(path: str | Path) -> Kit:
-    """The kit of a file; InputError when it is damaged or its parts can't be parts."""
+    """The kit of a file.
+
+    path : of a file of `save_kit`, such as the kit.json of a finished run
+
+    Raises InputError when it is damaged or its parts can't be parts.
+    """
     data = read_json(path)
     check_envelope(data, "kit", KIT_VERSION, source=path)
     check_range(data, source=path)
@@ -46,8 +51,14 @@ def check_lengths(kit: Kit) -> None:
 
 
 def save_kit(path: str | Path, kit: Kit, *, overwrite: bool = False) -> Path:
-    """Write a kit, exactly: `load_kit` gives the same numbers. InputError when the file exists or
-    can't be written."""
+    """Write a kit, exactly: `load_kit` gives the same numbers. Returns the path.
+
+    path : of the file, .json
+    kit : lengths in its own units, angles in rad
+    overwrite : replace a file that exists
+
+    Raises InputError when the file exists and may not be replaced, or can't be written.
+    """
     data: dict[str, Any] = {"format": "kop_exudyn/kit", "version": KIT_VERSION}
     if kit.units is not None:
         data["units"] = kit.units.to_dict()

@@ -33,7 +33,12 @@ def save_result(path: str | Path, result: Mapping[str, Any], *, overwrite: bool 
 
 
 def load_result(path: str | Path) -> dict[str, Any]:
-    """The content of a result file; InputError when it is damaged or of another format."""
+    """The content of a result file.
+
+    path : of the result.json of a finished run
+
+    Raises InputError when it is damaged or of another format.
+    """
     data = read_json(path)
     check_envelope(data, "result", RESULT_VERSION, source=path)
     check_schema(data, "result", source=path)

@@ -51,9 +51,12 @@ def cluster(
 ) -> Clustering:
     """The best kit of several seeded k-means runs, improved by swaps.
 
-    q : (n_q,) parameters that the groups index
+    groups : the elements
+    q : (n_q,) parameters that the groups index; lengths in the designs' unit, angles in rad
     parts : kind -> number of parts
     bounds : kind -> (lower, upper) of the parts' parameters, besides the natural ones
+    restarts : runs from different parts, one at least
+    seed : of these parts; the same one gives the same kit
     penalties : kind -> weights of the parts' own energy, for kinds such as "slit"
 
     Parts come in canonical form and sorted; where there are fewer distinct elements than parts,

@@ -60,8 +60,11 @@ def fit_input(
 ) -> Evaluation:
     """The design's parameters of least F, from its input parameters; confirmed by Exudyn.
 
+    design : whose parameters are sought, and whose target they are to meet
     weights : of fit and energy, default: the fit weight of the design's class
-    lower, upper : (nq,) or one number each, besides the design's own bounds
+    lower, upper : (nq,) or one number each, besides the design's own bounds; lengths in the
+        design's unit, angles in rad
+    max_steps : of the optimiser
     tolerance : steps that promise or gain less than this share of F are the last
 
     Raises InputError for bounds that exclude each other, SimulationFailure when the input can't be

@@ -53,6 +53,8 @@ class KitResult:
     given, warnings : the same of the input designs, which no kit can mend; no warning where nothing
         stops them
     equilibria, newton_iterations : solved in all
+    wall_s : wall time of the whole run, s
+    peak_memory_mb : largest memory of all its processes together, MB
     settings : as given, for the record
     """
 

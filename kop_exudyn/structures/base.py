@@ -328,6 +328,9 @@ def class_names() -> list[str]:
 def design_from_dict(data: Mapping[str, Any], source: str = "design") -> Design:
     """Make the design that a design file's content describes.
 
+    data : the content, as the class's schema describes it
+    source : name of the file, which errors begin with and files that it names lie beside
+
     Raises InputError when the class is unknown or a field is missing, unknown or unusable.
     """
     class_name = data.get("class") if isinstance(data, Mapping) else None

@@ -36,6 +36,8 @@ class Term(ABC):
     without units.
 
     name : under which weights and files know it
+    design : whose term it is
+    reference : what the design is compared with
 
     Raises InputError when the term can't be judged for this design, which then needs the weight 0.
     """
@@ -55,19 +57,31 @@ class Term(ABC):
 
     @abstractmethod
     def value(self, role: Role, equilibrium: Equilibrium, fit: FitResult) -> float:
-        """The term in an equilibrium, whose joints (in the fitted role) were compared with the
-        target."""
+        """The term in one state.
+
+        role : of the state
+        equilibrium : the state, with its parameters
+        fit : of its joints to the target, which is of the fitted role
+        """
 
     @abstractmethod
     def gradient(self, role: Role, sensitivities: Sensitivities, fit: FitResult) -> np.ndarray:
-        """(nq,) its exact derivative in the parameters, by the adjoint method."""
+        """(nq,) its exact derivative in the parameters, by the adjoint method.
+
+        role : of the state
+        sensitivities : of the state, with its equilibrium
+        fit : as of `value`
+        """
 
     @abstractmethod
     def model(
         self, role: Role, sensitivities: Sensitivities, fit: FitResult
     ) -> tuple[np.ndarray, np.ndarray]:
         """Its gradient (nq,) and Hessian (nq, nq), or a positive semidefinite model of that
-        (Gauss-Newton)."""
+        (Gauss-Newton).
+
+        role, sensitivities, fit : as of `gradient`
+        """
 
 
 TERMS: Registry[type[Term]] = Registry(__package__)
