@@ -149,9 +149,7 @@ def _page(
     )
     page.section("How it was found").table(
         *stage_rows(result),
-        "Largest deviation of the joints, %. Input: the designs as given. Direct: every input "
-        "element replaced by its part. Unrelaxed: parts then tuned. Published: by the published "
-        "method, led and opened. Relaxed: elements still free. Assigned: built from the kit.",
+        _about_stages(result),
     )
     page.table(
         *displaced_rows(result),
@@ -234,6 +232,21 @@ def _outcome(result: KitResult) -> str:
     one = sum(result.kit.sizes.values()) == 1
     keep = "keeps" if one else "keep"
     return f"{counted_parts(result.kit.sizes)} {keep} {deviation_words(result)}."
+
+
+_STAGES = {
+    "direct": "Direct: every input element replaced by its part.",
+    "unrelaxed": "Unrelaxed: parts then tuned.",
+    "published": "Published: by the published method, led and opened.",
+    "relaxed": "Relaxed: elements still free.",
+    "assigned": "Assigned: built from the kit.",
+}
+
+
+def _about_stages(result: KitResult) -> str:
+    """What the columns are, of the stages that there are."""
+    found = (about for name, about in _STAGES.items() if name in result.stages)
+    return f"Largest deviation of the joints, %. Input: the designs as given. {' '.join(found)}"
 
 
 def _stops(verdicts: Sequence[Buildable]) -> list[str]:

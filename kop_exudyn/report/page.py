@@ -101,7 +101,7 @@ class Page:
             + "</tr>"
             for row in rows
         )
-        note = f"<caption>{_text(caption)}</caption>" if caption else ""
+        note = f"<caption><span>{_text(caption)}</span></caption>" if caption else ""
         self._body.append(
             f'<div class="scroll"><table>{note}<thead><tr>{head}</tr></thead>'
             f"<tbody>{body}</tbody></table></div>"
@@ -126,7 +126,7 @@ class Page:
         """
         head = "".join(_cell("th", heading, False) for heading in headings)
         body = "".join(f"<tr>{''.join(map(_drawn_cell, row))}</tr>" for row in rows)
-        note = f"<caption>{_text(caption)}</caption>" if caption else ""
+        note = f"<caption><span>{_text(caption)}</span></caption>" if caption else ""
         table = (
             f'<div class="scroll"><table class="drawings">{note}<thead><tr>{head}</tr></thead>'
             f"<tbody>{body}</tbody></table></div>"

@@ -12,12 +12,12 @@ from kop_exudyn.search.result import KitResult
 from .comparison import Row, draw_comparison, most_changed
 from .study import Study, StudyReport
 
+_INPUT = "Largest deviation of every design, logarithmic. Input: before any kit."
+_PUBLISHED = " Published, opened: the state that the designs of the published method open into."
 _STAGES = (
-    "Largest deviation of every design, logarithmic. Input: before any kit. Published, opened: the "
-    "state that the designs of the published method open into. Assigned: the kit found here. A "
-    "cross at the right: no equilibrium was found, or Exudyn didn't confirm it. A ring: it buckled "
-    "into another state: led back to the elements of the input, it doesn't come back to the "
-    "input's shape."
+    " Assigned: the kit found here. A cross at the right: no equilibrium was found, or Exudyn "
+    "didn't confirm it. A ring: it buckled into another state: led back to the elements of the "
+    "input, it doesn't come back to the input's shape."
 )
 _DEVIATIONS = (
     "Deviations of the joints in % of the size. Utilisation: the largest of all states, of the "
@@ -35,7 +35,7 @@ def begin(study: Study, rows: Sequence[Row], finding: str) -> StudyReport:
     report.figure(
         "deviations",
         draw_comparison(rows),
-        _STAGES,
+        _INPUT + (_PUBLISHED if any(map(_published, rows)) else "") + _STAGES,
         alt="Deviation of all designs: inputs, baselines and both stages",
     )
     report.table(
@@ -44,6 +44,11 @@ def begin(study: Study, rows: Sequence[Row], finding: str) -> StudyReport:
         _DEVIATIONS,
     )
     return report
+
+
+def _published(row: Row) -> bool:
+    """Whether a row has the published method beside the others."""
+    return any(name.startswith("published") and value is not None for name, value in row.items())
 
 
 def realised(result: KitResult) -> str:

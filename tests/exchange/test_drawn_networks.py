@@ -442,3 +442,22 @@ def test_a_gap_between_ends_is_told_once():
     net = drawn_network(Drawing(drawn), ReadingOptions())
     doubts = [finding.text for finding in net.findings if "a joint may be meant" in finding.text]
     assert len(doubts) == 1 and "arc 0" in doubts[0] and "arc 6" in doubts[0]
+
+
+def test_why_there_is_no_network_is_found_once(monkeypatch):
+    """It was searched for again by the preview, by the summary and by the error."""
+    from kop_exudyn.exchange import drawn_networks
+
+    calls = []
+
+    def counting(*args, **options):
+        calls.append(args)
+        raise InputError("crosses no other curve", field="curves[0]")
+
+    monkeypatch.setattr(drawn_networks, "network", counting)
+    lines = [DrawnCurve(np.array([[0.0, y, 0.0], [3.0, y, 0.0]]), False, f"l{y}") for y in (0, 1)]
+    drawn = drawn_networks.drawn_network(Drawing(lines))
+    for _ in range(3):
+        with pytest.raises(InputError, match="crosses no other curve"):
+            drawn.network  # noqa: B018
+    assert len(calls) == 1
