@@ -822,13 +822,13 @@ def _passing() -> str:
 
 @case(
     "faces_only.obj",
-    Refused("contains no curves (1 faces, which are a surface's: --edges reads them"),
+    Refused("contains no curves (1 face, which is a surface's: --edges reads them"),
 )
 def _faces() -> str:
     return "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
 
-@case("surfaces_only.obj", Refused("contains no curves (1 surf elements)"))
+@case("surfaces_only.obj", Refused("contains no curves (1 surf element)"))
 def _surface_only() -> str:
     head = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\ncstype bezier\ndeg 1 1\n"
     return head + "surf 0 1 0 1 1 2 3 4\nparm u 0 1\nparm v 0 1\nend\n"

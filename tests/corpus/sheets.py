@@ -214,7 +214,7 @@ def _missing() -> bytes:
     return dxf(draw)
 
 
-@case("six_ends_in_a_place.obj", Refused("More than four ends of curves meet at 1 places"))
+@case("six_ends_in_a_place.obj", Refused("More than four ends of curves meet at 1 place,"))
 def _six() -> str:
     star = [((0, 0), (np.cos(a), np.sin(a))) for a in np.arange(6) * np.pi / 3]
     rim = [(star[k][1], star[k - 1][1]) for k in range(6)]

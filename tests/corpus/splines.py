@@ -304,6 +304,6 @@ def _no_knots() -> str:
     return "v 0 0 0\nv 1 0 0\ncstype bspline\ndeg 1\ncurv 0 1 1 2\nend\n"
 
 
-@case("free_form_unknown.obj", Refused("contains no curves (1 curv elements)"))
+@case("free_form_unknown.obj", Refused("contains no curves (1 curv element)"))
 def _taylor() -> str:
     return "v 0 0 0\nv 1 0 0\ncstype taylor\ndeg 1\ncurv 0 1 1 2\nparm u 0 1\nend\n"
