@@ -103,20 +103,27 @@ def _obj_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
             "surface's: --edges "
             "reads them"
         )
-    unit = said_unit(content)
-    return Drawing(curves, unit, None if unit is None else LENGTHS[unit], skipped)
+    unit, doubts = said_unit(content)
+    return Drawing(curves, unit, None if unit is None else LENGTHS[unit], skipped, doubts)
 
 
-def said_unit(content: bytes) -> str | None:
+def said_unit(content: bytes) -> tuple[str | None, list[str]]:
     """The unit of length that a comment before an OBJ file's elements says, as "# unit: mm" or, of
-    Rhino, "# File units = millimeters"; None where none does, or it isn't known here."""
+    Rhino, "# File units = millimeters"; None where none does, it isn't known here, or comments say
+    different ones. And what is doubtful about it."""
+    words = []
     for line in content[:_HEAD].decode("utf-8", "replace").splitlines():
         if line.strip() and not line.lstrip().startswith("#"):
-            return None
+            break
         if found := _UNIT_COMMENT.match(line):
-            word = found.group(1).lower()
-            return word if word in LENGTHS else _UNIT_WORDS.get(word)
-    return None
+            words.append(found.group(1).lower())
+    units = [word if word in LENGTHS else _UNIT_WORDS.get(word) for word in words]
+    if len(set(units)) > 1:
+        said = ", ".join(dict.fromkeys(words))
+        return None, [f"its comments say different units ({said}): give --scale and --unit"]
+    if None in units:
+        return None, [f"its unit is called {words[0]}, which isn't known: give --scale and --unit"]
+    return (units[0] if units else None), []
 
 
 def _free_forms(found: ObjContent) -> Iterator[DrawnCurve]:

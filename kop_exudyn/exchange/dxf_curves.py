@@ -7,6 +7,7 @@ read in any case. What can't be read is named: blocks of other files, texts, sol
 
 from __future__ import annotations
 
+import codecs
 import io
 import re
 from collections import Counter
@@ -84,6 +85,8 @@ class _Placed:
 def dxf_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
     """The drawing in a DXF file's bytes. Raises InputError for what can't be read, and for layers
     that aren't there."""
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        content = content.decode("utf-16", errors="replace").encode()
     document, doubts = _document(load_ezdxf(), content)
     space = document.modelspace()
     wanted = {name.lower() for name in layers}
@@ -121,8 +124,8 @@ def dxf_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
                 unseen[f"outside the clip (XCLIP) of block {e.clips[-1].block}"] += 1
     skipped = [f"{n} {what}" for what, n in unseen.items()]
     skipped += [
-        f"{n} insertions of {name}, a block of another file: bind it to this one, or import that "
-        "file"
+        f"{counted(n, 'insertion')} of {name}, a block of another file: bind it to this one, or "
+        "import that file"
         for name, n in elsewhere.items()
     ]
     if others:

@@ -55,9 +55,9 @@ def edges_of(path: Path) -> Drawing:
         )
         for a, b in pairs
     ]
-    unit = said_unit(content) if suffix == ".obj" else None
+    unit, doubts = said_unit(content) if suffix == ".obj" else (None, [])
     kept = [curve for curve in curves if np.ptp(curve.points, axis=0).any()]
-    return Drawing(kept, unit, None if unit is None else LENGTHS[unit])
+    return Drawing(kept, unit, None if unit is None else LENGTHS[unit], doubts=doubts)
 
 
 def _of_obj(content: bytes) -> Edges:

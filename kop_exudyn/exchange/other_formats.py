@@ -36,6 +36,9 @@ _FORMATS = {
     "jpg": ("a picture of pixels", "draw the net over it in CAD"),
     "jpeg": ("a picture of pixels", "draw the net over it in CAD"),
     "zip": ("an archive", "unpack it"),
+    "geojson": ("a map", f"{_DRAWING}, in QGIS, say"),
+    "kml": ("a map", f"{_DRAWING}, in QGIS, say"),
+    "shp": ("a map", f"{_DRAWING}, in QGIS, say"),
     "csv": ("a table", _DRAWING),
     "xlsx": ("a table", _DRAWING),
 }

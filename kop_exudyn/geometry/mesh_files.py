@@ -6,6 +6,7 @@ import io
 import json
 import logging
 import os
+import re
 import struct
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -16,11 +17,13 @@ import numpy as np
 from ..errors import InputError
 from .mesh_cleaning import WELD, cleaned, triangles_of
 from .obj_files import parse_obj
-from .ply_files import elements_of, parse_ply
+from .ply_files import END_OF_HEAD, elements_of, parse_ply
 
 log = logging.getLogger(__name__)
 
 COMPAS = ".json"
+_STL_HEAD, _STL_FACE = 84, 50  # bytes
+_LOOKED_AT = 4096  # bytes at the beginning of a file that tell whether it is text
 MOST_FACES = 1_000_000
 _SIZE_LIMIT = 128 * 2**20  # bytes
 
@@ -54,6 +57,10 @@ def read_mesh(
     except InputError as error:
         place = f"{error.field}: " if error.field else ""
         raise InputError(place + error.message, field=field, value=path.name) from None
+    except RecursionError:
+        raise InputError(
+            "is nested too deeply to be a mesh", field=field, value=path.name
+        ) from None
     except Exception as error:  # the readers raise whatever the broken file leads them to
         raise InputError(
             f"can't be read as a mesh: {str(error)[:100]}", field=field, value=path.name
@@ -103,15 +110,27 @@ def _obj(content: bytes) -> Mesh:
 
 
 def _stl(content: bytes) -> Mesh:
-    """Binary files say in their head how many faces they have, 50 bytes each."""
-    if len(content) >= 84:
-        (n_faces,) = struct.unpack("<I", content[80:84])
-        if len(content) == 84 + 50 * n_faces:
-            _check_count(n_faces)
-    return _by_trimesh(content, "stl")
+    """Binary files say in their head how many faces they have, 50 bytes each; what some programs
+    write after these isn't looked at."""
+    if len(content) < _STL_HEAD or b"facet normal" in content[:_LOOKED_AT].lower():
+        return _by_trimesh(content, "stl")
+    (n_faces,) = struct.unpack("<I", content[80:_STL_HEAD])
+    room, behind = divmod(len(content) - _STL_HEAD, _STL_FACE)
+    if n_faces > room:
+        raise InputError(
+            f"ends after {room:,} of its {n_faces:,} faces: it is cut off, or no binary STL file"
+        )
+    if n_faces < room and not behind:
+        raise InputError(
+            f"has {room:,} faces, but says that it has {n_faces:,}: its head is damaged"
+        )
+    _check_count(n_faces)
+    return _by_trimesh(content[: _STL_HEAD + _STL_FACE * n_faces], "stl")
 
 
 def _ply(content: bytes) -> Mesh:
+    if END_OF_HEAD not in content:
+        raise InputError("ends within its head: it is cut off")
     if "tristrips" not in elements_of(content):
         return _by_trimesh(content, "ply")
     found = parse_ply(content)
@@ -120,6 +139,23 @@ def _ply(content: bytes) -> Mesh:
 
 
 def _off(content: bytes) -> Mesh:
+    """Text, a vertex or a face a line, after their numbers."""
+    text = re.sub(r"#.*", "", content.decode("utf-8", errors="replace"))
+    rows = [line for line in text.splitlines() if line.strip()]
+    word, *counts = rows[0].split() if rows else [""]
+    if not word.upper().endswith("OFF"):
+        raise InputError('doesn\'t begin with "OFF", as OFF files do')
+    if "BINARY" in counts:
+        raise InputError("is a binary OFF file: save it as text, or as PLY")
+    first = 1 if counts else 2
+    counts = counts or (rows[1].split() if len(rows) > 1 else [])
+    if len(counts) < 2 or not all(count.isdecimal() for count in counts[:2]):
+        raise InputError("doesn't say how many vertices and faces it has")
+    wanted = sum(map(int, counts[:2]))
+    if wanted > len(rows) - first:
+        raise InputError(
+            f"ends after {len(rows) - first:,} of its {wanted:,} vertices and faces: it is cut off"
+        )
     return _by_trimesh(content, "off")
 
 

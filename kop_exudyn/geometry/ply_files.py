@@ -15,7 +15,7 @@ from ..errors import InputError
 
 _ELEMENT = re.compile(rb"^element\s+(\w+)\s+(\d{1,18})\s*$", re.MULTILINE)
 _LISTS = ("vertex_indices", "vertex_index")  # names of lists of vertices, as programs write them
-_END = b"end_header"
+END_OF_HEAD = b"end_header"
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class PlyContent:
 
 def elements_of(content: bytes) -> dict[str, int]:
     """Names and numbers of elements, as a PLY file's head has them."""
-    head = content[: content.find(_END) + 1]
+    head = content[: content.find(END_OF_HEAD) + 1]
     return {name.decode(): int(count) for name, count in _ELEMENT.findall(head)}
 
 

@@ -43,7 +43,7 @@ def _xref() -> bytes:
     return dxf(draw)
 
 
-@case("file_within_the_file_only.dxf", Refused("1 insertions of OTHER, a block of another file"))
+@case("file_within_the_file_only.dxf", Refused("1 insertion of OTHER, a block of another file"))
 def _xref_only() -> bytes:
     def draw(document: Any, space: Any) -> None:
         document.add_xref_def("other.dwg", "OTHER")

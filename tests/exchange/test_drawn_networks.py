@@ -461,3 +461,32 @@ def test_why_there_is_no_network_is_found_once(monkeypatch):
         with pytest.raises(InputError, match="crosses no other curve"):
             drawn.network  # noqa: B018
     assert len(calls) == 1
+
+
+@pytest.mark.parametrize(
+    ("comments", "unit", "doubt"),
+    [
+        ("# unit: cm\n", "cm", None),
+        ("# unit: cm\n# File units = centimeters\n", "cm", None),
+        ("# unit: cm\n# unit: mm\n", None, "different units (cm, mm)"),
+        ("# unit: bananas\n", None, "called bananas"),
+    ],
+)
+def test_units_that_comments_say(comments, unit, doubt, tmp_path):
+    """The first of two was taken, and an unknown one passed over, without a word."""
+    (tmp_path / "net.obj").write_text(comments + GRID)
+    drawing = read_drawing(tmp_path / "net.obj")
+    assert drawing.unit == unit
+    assert [doubt in text for text in drawing.doubts] == ([True] if doubt else [])
+
+
+def test_a_dxf_file_in_utf_16(tmp_path):
+    document = ezdxf.new("R2010")
+    for k in range(3):
+        document.modelspace().add_line((-0.5, k), (2.5, k))
+        document.modelspace().add_line((k, -0.5), (k, 2.5))
+    document.saveas(tmp_path / "a.dxf")
+    text = (tmp_path / "a.dxf").read_text(encoding="utf-8")
+    (tmp_path / "b.dxf").write_bytes(text.encode("utf-16"))
+    found = [read_network(tmp_path / name).network.n_joints for name in ("a.dxf", "b.dxf")]
+    assert found == [9, 9]

@@ -1,6 +1,7 @@
 """Meshes from files of other programs."""
 
 import json
+import struct
 
 import numpy as np
 import pytest
@@ -113,7 +114,7 @@ def changed(**changes) -> str:
             changed(vertex={"0": {"x": float("nan")}, "1": {}, "2": {}}, face={"0": [0, 1, 2]}),
             "finite",
         ),
-        ("mesh.ply", "ply\nformat", "can't be read as a mesh"),
+        ("mesh.ply", "ply\nformat", "ends within its head"),
     ],
 )
 def test_bad_files(name, content, message, tmp_path):
@@ -149,3 +150,55 @@ def test_a_grid_on_a_compas_mesh(repository, write_json_file, tmp_path):
     again = load_design(write_json_file("design.json", design))
     wanted = load_design(repository / "models" / "grids" / "06_mesh.json")
     np.testing.assert_allclose(again.parameters, wanted.parameters, rtol=1e-12)
+
+
+SQUARE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], float)
+
+
+def binary_stl(says=2, behind=b"", order="<"):
+    """Two triangles of a square."""
+    content = b"made by hand".ljust(80) + struct.pack(f"{order}I", says)
+    for face in ((0, 1, 2), (1, 3, 2)):
+        content += struct.pack(f"{order}12fH", 0, 0, 1, *SQUARE[list(face)].ravel(), 7)
+    return content + behind
+
+
+def off(head="OFF\n4 2 0\n", faces="3 0 1 2\n3 1 3 2\n"):
+    return (head + "".join(f"{x} {y} {z}\n" for x, y, z in SQUARE) + faces).encode()
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("bytes_behind.stl", binary_stl(behind=b"\0" * 7)),
+        ("head_like_text.stl", b"solid" + binary_stl()[5:]),
+        ("plain.off", off()),
+        ("head_in_one_line.off", off("OFF 4 2 0 # four and two\n\n")),
+        ("comments.off", off("# made by hand\nOFF\n# numbers\n4 2 0\n")),
+    ],
+)
+def test_what_programs_write_besides_the_faces(name, content, tmp_path):
+    (tmp_path / name).write_bytes(content)
+    vertices, faces = read_mesh(tmp_path / name)
+    assert len(vertices) == 4 and len(faces) == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("cut_off.stl", binary_stl(says=3), "ends after 2 of its 3 faces"),
+        ("big_endian.stl", binary_stl(order=">"), "ends after 2 of its 33,554,432 faces"),
+        ("damaged_head.stl", binary_stl(says=1), "has 2 faces, but says that it has 1"),
+        ("cut_off.off", off("OFF\n4 3 0\n"), "ends after 6 of its 7 vertices and faces"),
+        ("no_word.off", off("4 2 0\n"), 'doesn\'t begin with "OFF"'),
+        ("no_numbers.off", b"OFF\n", "doesn't say how many"),
+        ("binary.off", b"OFF BINARY\n\0\0\0\4", "is a binary OFF file"),
+        ("cut_off.ply", b"ply\nformat ascii 1.0\nelement vertex 3\n", "ends within its head"),
+        ("deep.json", b"[" * 100_000, "nested too deeply"),
+    ],
+)
+def test_damage_is_called_by_its_name(name, content, message, tmp_path):
+    """Some of it was read without what is missing, or told in words of the reader's code."""
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=message):
+        read_mesh(tmp_path / name)
