@@ -45,11 +45,11 @@ if TYPE_CHECKING:  # the same names, for type checkers and editors
     from .report.kit_run import optimize_and_report as optimize_and_report
     from .report.plot import plot as plot
     from .search.input_fit import fit_input as fit_input
-    from .search.objective import Weights as Weights
     from .search.result import KitResult as KitResult
     from .search.run import optimize_kit as optimize_kit
     from .search.settings import JobSettings as JobSettings
     from .search.settings import StageSettings as StageSettings
+    from .search.weights import Weights as Weights
     from .structures.base import Design as Design
     from .structures.base import design_from_dict as design_from_dict
     from .structures.loads import LoadCase as LoadCase
@@ -64,7 +64,7 @@ _PUBLIC = {
     "kit.cluster": ("cluster",),
     "search.input_fit": ("fit_input",),
     "search.run": ("optimize_kit",),
-    "search.objective": ("Weights",),
+    "search.weights": ("Weights",),
     "search.settings": (
         "JobSettings",
         "StageSettings",

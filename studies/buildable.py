@@ -29,7 +29,7 @@ from kop_exudyn.drawing.style import PALETTE, style
 from kop_exudyn.io.datasets import select_files
 from kop_exudyn.report.designs import DrawnDesign, draw_designs
 from kop_exudyn.report.kit_drawings import drawn_state
-from kop_exudyn.search.objective import Evaluation
+from kop_exudyn.search.evaluation import Evaluation
 from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.result import KitResult
 from kop_exudyn.structures.base import Design

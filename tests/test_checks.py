@@ -21,7 +21,7 @@ from kop_exudyn.fabrication.options import CutOptions, Tolerances
 from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.search.tolerance import Tolerance
-from kop_exudyn.sqp.solver import SQPOptions
+from kop_exudyn.sqp.options import SQPOptions
 
 WORDS = ("schedule", "bounds", "constraints", "hessian", "effort", "requirements")
 NUMBERS = [field.name for field in fields(StageSettings) if field.name not in WORDS]

@@ -11,7 +11,8 @@ import numpy as np
 from ..equilibrium.equilibria import Equilibrium
 from ..errors import SimulationFailure
 from ..scene.scene import Scene
-from ..search.objective import DesignObjective, Evaluation
+from ..search.evaluation import Evaluation
+from ..search.objective import DesignObjective
 from ..search.stage_results import SAME_STATE
 from ..search.tolerance import Tolerance, sample_spread
 from ..structures.base import Design

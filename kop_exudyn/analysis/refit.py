@@ -14,8 +14,10 @@ import numpy as np
 
 from ..errors import SimulationFailure
 from ..search.input_fit import OwnProblem
-from ..search.objective import DesignObjective, Weights
-from ..sqp.solver import SQPOptions, StepRecord, minimise
+from ..search.objective import DesignObjective
+from ..search.weights import Weights
+from ..sqp.options import SQPOptions
+from ..sqp.solver import StepRecord, minimise
 from ..structures.base import design_from_dict
 from ..structures.deviation import Deviation, deviation
 from .simulation import SimulationResult, simulate

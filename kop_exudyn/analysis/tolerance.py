@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import SimulationFailure
-from ..search.objective import Evaluation
+from ..search.evaluation import Evaluation
 from ..search.tolerance import Sample, Tolerance, joint_jacobian, sample_spread
 from ..structures.base import Design
 

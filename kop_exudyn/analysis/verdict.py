@@ -17,7 +17,8 @@ from ..equilibrium.stability import softest_mode
 from ..equilibrium.system import System
 from ..errors import InputError, SimulationFailure
 from ..scene.scene import Scene
-from ..search.objective import DesignObjective, Evaluation
+from ..search.evaluation import Evaluation
+from ..search.objective import DesignObjective
 from ..search.stage_results import SAME_STATE, distance
 from ..search.tolerance import Tolerance, sample_spread, usual_tolerance
 from ..structures.base import Design

@@ -280,7 +280,7 @@ def _as_asked(args: argparse.Namespace, study: Study) -> Study:
     """The study with what the options change of its settings, weights and verdict."""
     from dataclasses import replace
 
-    from ..search.objective import Weights
+    from ..search.weights import Weights
 
     Weights.of(args.weights or {})  # names that aren't terms are found before anything is read
     required = _required(args, study.settings.requirements)

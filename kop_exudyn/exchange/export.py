@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..fabrication.pieces import PartsList, parts_list_of
 from ..files.files import file_stem, make_folder
 from ..files.tables import write_csv
-from ..search.objective import Evaluation
+from ..search.evaluation import Evaluation
 from ..search.result import KitResult
 from ..structures.base import Target
 from .compas_json import write_compas

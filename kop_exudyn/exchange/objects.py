@@ -8,7 +8,7 @@ from typing import Any
 from ..analysis.simulation import SimulationResult
 from ..errors import InputError
 from ..fabrication.pieces import parts_list_of
-from ..search.objective import Evaluation
+from ..search.evaluation import Evaluation
 from ..search.result import KitResult
 from .compas_json import compas_data
 from .export import all_labels

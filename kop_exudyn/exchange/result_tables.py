@@ -11,7 +11,7 @@ import numpy as np
 from ..equilibrium.equilibria import Equilibrium
 from ..fabrication.pieces import PartsList, parts_list_of
 from ..kit.kinds import part_kind
-from ..search.objective import Evaluation
+from ..search.evaluation import Evaluation
 from ..search.result import INPUT, REDEPLOYED, STAGES, KitResult
 from ..structures.base import Design
 from ..structures.deviation import fit_summary

@@ -20,7 +20,7 @@ from ..equilibrium.equilibria import Equilibrium
 from ..fabrication.pieces import PartsList
 from ..fabrication.placement import PlacedPieces
 from ..scene.scene import Scene
-from ..search.objective import Evaluation
+from ..search.evaluation import Evaluation
 from ..structures.base import Design, Target
 from ..structures.fitting import FitResult, Placement
 from ..structures.strength import Strength, materials_of, rod_strength

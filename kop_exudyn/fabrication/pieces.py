@@ -18,7 +18,7 @@ from ..errors import InputError
 from ..kit.kinds import PartKind, part_kind
 from ..kit.parts import Assignment, Kit
 from ..scene.state import State
-from ..search.objective import Evaluation
+from ..search.evaluation import Evaluation
 from ..search.result import KitResult
 from ..structures.base import Design
 from ..structures.fitting import TargetFitting

@@ -17,10 +17,12 @@ from ..kit.groups import ElementGroup
 from ..kit.optimality import ClusteringGap
 from ..kit.parts import Assignment, Kit
 from ..scene.state import State
+from ..search.evaluation import Evaluation
 from ..search.events import StageEvent, events_from_list
-from ..search.objective import DesignObjective, Evaluation, Reference, Weights, reference_of
+from ..search.objective import DesignObjective, Reference, reference_of
 from ..search.result import INPUT, REDEPLOYED, STAGES, KitResult
 from ..search.stage_results import Jump, StageResult
+from ..search.weights import Weights
 from ..structures.base import Design, Role
 from ..structures.serving import served_by
 from ..structures.stacking import parameter_offsets, stacked_groups, stacked_parameters

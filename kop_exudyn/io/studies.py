@@ -17,9 +17,9 @@ from ..errors import InputError
 from ..files.documents import check_envelope, check_range, check_schema
 from ..files.files import read_bytes
 from ..kit.kinds import Bounds, part_kind
-from ..search.objective import Weights
 from ..search.requirements import Requirements
 from ..search.settings import JobSettings, StageSettings
+from ..search.weights import Weights
 from ..structures.base import Design
 from .designs import design_files, load_all, select_among
 

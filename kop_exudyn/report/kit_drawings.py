@@ -11,7 +11,7 @@ from ..errors import SimulationFailure
 from ..kit.groups import ElementGroup
 from ..kit.kinds import part_kind
 from ..kit.optimality import ClusteringGap
-from ..search.objective import Evaluation
+from ..search.evaluation import Evaluation
 from ..search.result import INPUT, REDEPLOYED, STAGES, KitResult
 from ..search.starts import TriedStart
 from ..structures.base import Design

@@ -21,7 +21,7 @@ from ..errors import SimulationFailure
 from ..exchange.meshes import sweep
 from ..fabrication.pieces import DesignPieces, parts_list_of
 from ..fabrication.placement import PlacedPieces
-from ..search.objective import Evaluation
+from ..search.evaluation import Evaluation
 from ..search.result import KitResult
 from ..structures.fitting import Placement
 from ..units import Units, unit_of

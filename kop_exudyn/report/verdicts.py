@@ -13,10 +13,10 @@ from ..analysis.load_check import LoadCheck
 from ..analysis.verdict import Buildable, VerdictSettings, judge, judge_given
 from ..errors import SimulationFailure
 from ..fabrication.limits import cutting_problems
-from ..search.objective import Weights
 from ..search.pool import DesignPool
 from ..search.requirements import Requirements
 from ..search.result import KitResult
+from ..search.weights import Weights
 from ..units import Units, in_millimetres, unit_of
 from ..wording import counted
 

@@ -19,7 +19,7 @@ from ..fabrication.pieces import DesignPieces, PartsList, parts_list_of
 from ..fabrication.placement import PlacedPieces
 from ..kit.kinds import PartKind, part_kind
 from ..scene.scene import Scene
-from ..search.objective import Evaluation
+from ..search.evaluation import Evaluation
 from ..search.result import KitResult
 from ..structures.base import Design, Target
 from ..structures.deviation import fit_summary

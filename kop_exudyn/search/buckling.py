@@ -5,7 +5,8 @@ from __future__ import annotations
 from ..errors import SimulationFailure
 from ..structures.base import Design
 from ..structures.opening import SAME_STATE
-from .objective import DesignObjective, Evaluation, Reference
+from .evaluation import Evaluation
+from .objective import DesignObjective, Reference
 
 
 def missed_on_return(

@@ -12,8 +12,9 @@ import numpy as np
 from ..errors import InputError
 from ..files.arrays import numbers_of
 from ..sqp.history import SQPState
+from ..sqp.options import SQPOptions, SQPResult
 from ..sqp.problem import Point
-from ..sqp.solver import SQPOptions, SQPResult, minimise
+from ..sqp.solver import minimise
 from .dataset import evaluations_from_arrays, evaluations_to_arrays
 from .events import Observer, SQPLabel, StageEvent
 from .problems import RelaxedProblem

@@ -18,10 +18,12 @@ from ..scene.state import State
 from ..sqp.model import penalty_of
 from ..structures.base import Design
 from ..structures.stacking import group_designs, parameter_offsets, stacked_groups
-from .objective import DesignDerivatives, DesignObjective, Evaluation, Reference, Weights
+from .evaluation import DesignDerivatives, Evaluation
+from .objective import DesignObjective, Reference
 from .pool import DesignPool
 from .requirements import Requirements
 from .tolerance import forgives
+from .weights import Weights
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -11,10 +11,13 @@ import scipy.sparse as sp
 
 from ..kit.kinds import part_kind
 from ..sqp.constraints import LinearConstraints
+from ..sqp.options import SQPOptions
 from ..sqp.problem import Derivatives, Point
-from ..sqp.solver import SQPOptions, minimise
+from ..sqp.solver import minimise
 from ..structures.base import Design
-from .objective import DesignObjective, Evaluation, Weights
+from .evaluation import Evaluation
+from .objective import DesignObjective
+from .weights import Weights
 
 
 class OwnProblem:

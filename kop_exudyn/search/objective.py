@@ -11,24 +11,25 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
 
-from ..checks import check_positive
 from ..equilibrium.equilibria import Equilibrium, Start
-from ..equilibrium.exudyn_confirm import Confirmation, confirm
+from ..equilibrium.exudyn_confirm import confirm
 from ..equilibrium.newton import NewtonOptions, refine, solve
 from ..equilibrium.sensitivities import Sensitivities
 from ..errors import InputError, SimulationFailure
 from ..structures.base import Design
-from ..structures.fitting import FitResult, TargetFitting, best_placement
+from ..structures.fitting import TargetFitting, best_placement
 from ..structures.load_bound import LoadBound
 from ..structures.opening import SAME_STATE
 from ..structures.stress_bound import NEAR, Rows, StressBound
+from .evaluation import DesignDerivatives, Evaluation
 from .requirements import Requirements
 from .terms.base import Reference, term_class
+from .weights import Weights
 
 log = logging.getLogger(__name__)
 
@@ -38,132 +39,6 @@ _TRIAL = NewtonOptions(max_iterations=80)
 # up to 0.6 % one step ends where five do, to five digits of J, in a fifth of the time; ways that
 # begin in another state than the designs open into need more.
 _REACH = 0.002
-
-
-@dataclass(frozen=True)
-class Weights:
-    """Weights of the objective's terms; a term of weight zero is not computed.
-
-    fit : beta, on T / l0^2
-    energy : gamma, on E / E0
-    share : of the target positions in T; the rest is closest points
-    level : share of the size beyond which distances from the target count with their fourth power,
-        see `TargetFitting`; None: never
-    others : (name, weight) of other terms, see the modules of `terms/`; `Weights.of` takes all by
-        name
-
-    Raises InputError for unknown terms, and for weights that are negative or not finite.
-    """
-
-    fit: float = 1e4
-    energy: float = 0.02
-    share: float = 0.1
-    level: float | None = None
-    others: tuple[tuple[str, float], ...] = ()
-
-    def __post_init__(self) -> None:
-        if self.level is not None:
-            check_positive("weights.level", self.level)
-        for name, weight in self.of_terms().items():
-            term_class(name)
-            if not (isinstance(weight, (int, float)) and 0 <= weight < float("inf")):
-                raise InputError(
-                    "a weight is a finite number, not negative",
-                    field=f"weights.{name}",
-                    value=weight,
-                )
-
-    @classmethod
-    def of(cls, values: Mapping[str, float]) -> Weights:
-        """Weights by the names of the terms (and "share"); those not given have their defaults."""
-        own = {name: values[name] for name in ("fit", "energy", "share", "level") if name in values}
-        return cls(
-            **own,
-            others=tuple(
-                sorted((name, weight) for name, weight in values.items() if name not in own)
-            ),
-        )
-
-    @classmethod
-    def suiting(
-        cls, designs: Sequence[Design], values: Mapping[str, float] | None = None
-    ) -> Weights:
-        """Weights of fit and stress that suit the designs' class (see `Design.fit_weight`,
-        `Design.stress_weight`), unless values say else."""
-        own = {"fit": max(design.fit_weight for design in designs)}
-        if stress := max(design.stress_weight for design in designs):
-            own["stress"] = stress
-        return cls.of({**own, **(values or {})})
-
-    def of_terms(self) -> dict[str, float]:
-        """Weights by the terms' names."""
-        return {"fit": self.fit, "energy": self.energy, **dict(self.others)}
-
-    def to_dict(self) -> dict[str, float]:
-        """What `of` takes."""
-        felt = {} if self.level is None else {"level": self.level}
-        own = {"fit": self.fit, "energy": self.energy, "share": self.share}
-        return {**own, **felt, **dict(self.others)}
-
-
-@dataclass(frozen=True)
-class Evaluation:
-    """One design at one parameter vector.
-
-    q : (nq,)
-    value : F
-    terms : its weighted parts by name ("fit", "energy ROLE", ...)
-    fit : target fitting of the joints
-    equilibria : by role
-    confirmations : Exudyn's, by role; empty until a result is made of it
-    iterations, solves : Newton iterations and equilibria that it took
-    utilisation : by state, the largest equivalent stress over what is allowed; empty where stress
-        is not bounded. States are the roles, and the stations of the way that are known; under
-        loads the deflections are states of their own
-    loaded : by load case and factor, the states under loads, where they are bounded; empty for a
-        case under which the design gives way
-    way : the states at the stations of `Design.way`, known for points that are kept where designs
-        have to open by themselves
-    """
-
-    q: np.ndarray
-    value: float
-    terms: Mapping[str, float]
-    fit: FitResult
-    equilibria: Mapping[str, Equilibrium]
-    confirmations: Mapping[str, Confirmation]
-    iterations: int
-    solves: int
-    utilisation: Mapping[str, float] = field(default_factory=dict)
-    way: tuple[Equilibrium, ...] = ()
-    loaded: Mapping[str, Mapping[float, Equilibrium]] = field(default_factory=dict)
-
-    @property
-    def excess(self) -> dict[str, float]:
-        """By how much the bounds are exceeded, by state; zero where they are met."""
-        return {state: max(0.0, value - 1.0) for state, value in self.utilisation.items()}
-
-
-@dataclass(frozen=True)
-class DesignDerivatives:
-    """Gradient (nq,) and model Hessian (nq, nq; None when not asked for) of F, and the refined
-    evaluation.
-
-    seconds : by phase, for profiles
-    bounds : by state, the bounds that come near to being met with, linearised
-    """
-
-    gradient: np.ndarray
-    hessian: np.ndarray | None
-    evaluation: Evaluation
-    seconds: Mapping[str, float]
-    bounds: Mapping[str, Rows] = field(default_factory=dict)
-
-    @property
-    def model(self) -> np.ndarray:
-        """The Hessian, which must have been asked for."""
-        assert self.hessian is not None
-        return self.hessian
 
 
 class DesignObjective:

@@ -15,8 +15,9 @@ from ..errors import SimulationFailure
 from ..plugins import adopt, registered_elsewhere
 from ..structures.base import Design
 from .memory import peak_memory_mb
-from .objective import DesignObjective, Reference, Weights, reference_of
+from .objective import DesignObjective, Reference, reference_of
 from .requirements import Requirements
+from .weights import Weights
 
 log = logging.getLogger(__name__)
 

@@ -17,8 +17,8 @@ from ..kit.stock import Stock
 from ..sqp.constraints import LinearConstraints
 from ..sqp.problem import Derivatives, Inequalities, Point
 from .dataset import Dataset
+from .evaluation import DesignDerivatives, Evaluation
 from .kit_rule import KitRule, SoughtKit
-from .objective import DesignDerivatives, Evaluation
 from .sliding import limit_rows, stacked
 
 # of the mean curvature: what holds parts that act by their limits alone

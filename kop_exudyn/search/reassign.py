@@ -24,7 +24,7 @@ from ..kit.kinds import part_kind
 from ..kit.parts import Assignment, Kit
 from ..kit.reuse import PieceCount
 from ..sqp.qp import QP, QPOptions, QPSolver
-from .objective import DesignDerivatives
+from .evaluation import DesignDerivatives
 from .problems import AssignedProblem
 from .sliding import Counting, descend_in_boxes
 

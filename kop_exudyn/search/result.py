@@ -19,8 +19,9 @@ from ..structures.fitting import TargetFitting
 from ..structures.stacking import group_designs
 from ..structures.strength import strength_summary
 from ..units import Units, common_units
+from .evaluation import Evaluation
 from .events import Stage, StageEvent, events_to_list
-from .objective import Evaluation, Reference
+from .objective import Reference
 from .stage_results import SAME_STATE, StageResult, distance
 from .starts import TriedStart
 

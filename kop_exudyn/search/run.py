@@ -30,11 +30,11 @@ from ..structures.stacking import (
 from ..units import common_units, unit_of, unnamed_units
 from .checkpoints import NoStore, Store
 from .dataset import Dataset
+from .evaluation import Evaluation
 from .events import UNRELAXED, Observer, StageEvent
 from .forgiving import proven
 from .levelling import level
 from .neighbours import resized
-from .objective import Evaluation, Weights
 from .opening import opened_stage
 from .pool import DesignPool
 from .published import published_method
@@ -44,6 +44,7 @@ from .settings import JobSettings
 from .stage_results import StageResult
 from .stages import Stages
 from .starts import assigned_from_starts, forgiving_from_starts
+from .weights import Weights
 
 log = logging.getLogger(__name__)
 

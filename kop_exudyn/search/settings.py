@@ -9,8 +9,8 @@ from ..checks import check_choice, check_flag, check_not_negative, check_positiv
 from ..errors import InputError
 from ..kit.kinds import Bounds, kind_names, part_kind
 from ..sqp.constraints import LinearConstraints
-from .objective import Weights
 from .requirements import Requirements
+from .weights import Weights
 
 
 @dataclass(frozen=True)

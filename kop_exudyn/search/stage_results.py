@@ -14,7 +14,7 @@ from ..kit.parts import Assignment, Kit
 from ..structures.base import Design
 from ..structures.opening import SAME_STATE  # noqa: F401
 from .dataset import Dataset
-from .objective import Evaluation
+from .evaluation import Evaluation
 
 # A joint that moves this much further in one step of the path than in the steps around it has
 # snapped.

@@ -19,10 +19,10 @@ import numpy as np
 from ..kit.cluster import cluster
 from ..kit.parts import Assignment, Kit
 from .assigned import assigned_stage
+from .evaluation import Evaluation
 from .events import SQPLabel
 from .exchange import exchanged
 from .forgiving import DEAR, forgiving_stage, secured_steps, substitute
-from .objective import Evaluation
 from .opening import opened_stage
 from .problems import AssignedProblem
 from .reassign import LocalModel, Reassignment, improved

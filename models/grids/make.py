@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from kop_exudyn.search.input_fit import fit_input
-from kop_exudyn.search.objective import Weights
+from kop_exudyn.search.weights import Weights
 from kop_exudyn.structures.base import design_from_dict
 
 FOLDER = Path(__file__).resolve().parent

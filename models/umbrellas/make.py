@@ -20,7 +20,7 @@ import numpy as np
 
 from kop_exudyn.files.json_files import write_json
 from kop_exudyn.search.input_fit import fit_input
-from kop_exudyn.search.objective import Weights
+from kop_exudyn.search.weights import Weights
 from kop_exudyn.structures.base import design_from_dict
 from kop_exudyn.structures.umbrella.generator import (
     LEAST_GROWTH,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kop_exudyn.search.objective import Evaluation
+from kop_exudyn.search.evaluation import Evaluation
 from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.result import KitResult
 from kop_exudyn.search.run import optimize_kit

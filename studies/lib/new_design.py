@@ -10,7 +10,7 @@ import numpy as np
 
 from kop_exudyn.kit.parts import Assignment, Kit
 from kop_exudyn.kit.projection import Projection
-from kop_exudyn.search.objective import Evaluation
+from kop_exudyn.search.evaluation import Evaluation
 from kop_exudyn.search.result import KitResult, summary_of
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings

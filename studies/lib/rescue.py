@@ -20,11 +20,11 @@ from kop_exudyn.report.designs import DrawnState
 from kop_exudyn.report.kit_drawings import drawn_state
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.events import StageEvent
-from kop_exudyn.search.objective import Weights
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.settings import StageSettings
 from kop_exudyn.search.stage_results import StageResult
 from kop_exudyn.search.stages import Stages
+from kop_exudyn.search.weights import Weights
 from kop_exudyn.structures.base import Design
 
 from .watched_path import WatchedPath, watch

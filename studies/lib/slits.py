@@ -14,12 +14,13 @@ from kop_exudyn.kit.elements import collect
 from kop_exudyn.kit.groups import ElementGroup
 from kop_exudyn.kit.parts import Assignment, Kit
 from kop_exudyn.search.dataset import Dataset
-from kop_exudyn.search.objective import Evaluation, Weights
+from kop_exudyn.search.evaluation import Evaluation
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.result import summary_of
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
+from kop_exudyn.search.weights import Weights
 from kop_exudyn.structures.base import Design
 
 

@@ -17,7 +17,6 @@ from kop_exudyn.kit.cluster import best_parts
 from kop_exudyn.kit.elements import Labels, collect
 from kop_exudyn.kit.parts import Assignment, Kit
 from kop_exudyn.search.dataset import Dataset
-from kop_exudyn.search.objective import Weights
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.problems import AssignedProblem
 from kop_exudyn.search.reassign import LocalModel
@@ -26,6 +25,7 @@ from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.search.stages import Stages
+from kop_exudyn.search.weights import Weights
 
 from .stress.arch import Arch
 

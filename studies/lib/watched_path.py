@@ -10,7 +10,7 @@ import numpy as np
 
 from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.search.dataset import Dataset
-from kop_exudyn.search.objective import Evaluation
+from kop_exudyn.search.evaluation import Evaluation
 from kop_exudyn.search.stage_results import Jump, StageResult, find_jump
 from kop_exudyn.structures.base import Design
 

@@ -12,12 +12,12 @@ from kop_exudyn.analysis.sizes import KitCost, deviation, smallest_kit, trade_of
 from kop_exudyn.errors import InputError
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.neighbours import resized
-from kop_exudyn.search.objective import Weights
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.search.stages import Stages
+from kop_exudyn.search.weights import Weights
 
 STAGES = StageSettings(
     schedule=(1e3, 1e5),

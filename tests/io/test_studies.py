@@ -10,9 +10,9 @@ from kop_exudyn.analysis.verdict import VerdictSettings
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.datasets import load_designs, select_files
 from kop_exudyn.io.studies import load_study
-from kop_exudyn.search.objective import Weights
 from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.weights import Weights
 
 HEAD = 'format = "kop_exudyn/study"\nversion = 1\n'
 

@@ -10,9 +10,10 @@ from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.search.buckling import buckled, missed_on_return, snapped
 from kop_exudyn.search.dataset import Dataset
-from kop_exudyn.search.objective import DesignObjective, Weights
+from kop_exudyn.search.objective import DesignObjective
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.stages import Stages
+from kop_exudyn.search.weights import Weights
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 

@@ -12,9 +12,10 @@ from support.settings import FEW_STEPS
 from kop_exudyn.analysis.load_check import check_load
 from kop_exudyn.equilibrium.newton import NewtonOptions
 from kop_exudyn.errors import InputError
-from kop_exudyn.search.objective import DesignObjective, Weights
+from kop_exudyn.search.objective import DesignObjective
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings
+from kop_exudyn.search.weights import Weights
 from kop_exudyn.structures import load_bound
 from kop_exudyn.structures.base import design_from_dict
 from kop_exudyn.structures.loading import loaded_state, supports_of

@@ -11,12 +11,13 @@ from kop_exudyn.io.designs import load_design
 from kop_exudyn.search import forgiving
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.forgiving import forgiving_stage
-from kop_exudyn.search.objective import DesignObjective, Weights
+from kop_exudyn.search.objective import DesignObjective
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.settings import StageSettings
 from kop_exudyn.search.stages import Stages
 from kop_exudyn.search.tolerance import forgives
+from kop_exudyn.search.weights import Weights
 
 # far larger errors than a workshop makes: this shell snaps with nothing less
 GROSS = Requirements(margin=10.0, samples=8)

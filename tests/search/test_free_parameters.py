@@ -11,11 +11,11 @@ from support.settings import FEW_ERRORS
 
 from kop_exudyn.kit.cluster import cluster
 from kop_exudyn.search.dataset import Dataset
-from kop_exudyn.search.objective import Weights
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.problems import AssignedProblem
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
+from kop_exudyn.search.weights import Weights
 from kop_exudyn.sqp.problem import Point
 from kop_exudyn.structures.base import Design, design_from_dict
 from kop_exudyn.structures.umbrella.generator import design_on_surface, height_field, hexagon_patch

@@ -7,7 +7,8 @@ import pytest
 
 from kop_exudyn.errors import InputError
 from kop_exudyn.search.input_fit import OwnProblem, fit_input
-from kop_exudyn.search.objective import DesignObjective, Weights
+from kop_exudyn.search.objective import DesignObjective
+from kop_exudyn.search.weights import Weights
 from kop_exudyn.structures.base import design_from_dict
 from kop_exudyn.structures.umbrella.generator import (
     design_on_surface,

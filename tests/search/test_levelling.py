@@ -12,9 +12,10 @@ from kop_exudyn.errors import InputError
 from kop_exudyn.search import levelling
 from kop_exudyn.search.events import SQPLabel
 from kop_exudyn.search.levelling import level, worst
-from kop_exudyn.search.objective import DesignObjective, Weights
+from kop_exudyn.search.objective import DesignObjective
 from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.settings import StageSettings
+from kop_exudyn.search.weights import Weights
 
 SETTINGS = StageSettings(assigned_steps=8, requirements=Requirements(samples=3))
 

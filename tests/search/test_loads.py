@@ -6,11 +6,12 @@ from support.grids import coarse_grid
 from kop_exudyn.analysis.load_check import check_load
 from kop_exudyn.analysis.verdict import VerdictSettings, judge
 from kop_exudyn.search.dataset import Dataset
-from kop_exudyn.search.objective import DesignObjective, Weights
+from kop_exudyn.search.objective import DesignObjective
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.settings import StageSettings
 from kop_exudyn.search.stages import Stages
+from kop_exudyn.search.weights import Weights
 from kop_exudyn.structures.base import design_from_dict
 
 PARTS = {"linear": 4, "angular": 2}

@@ -11,10 +11,10 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from kop_exudyn.io.datasets import load_designs
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.events import UNRELAXED
-from kop_exudyn.search.objective import Weights
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.settings import StageSettings
 from kop_exudyn.search.stages import Stages
+from kop_exudyn.search.weights import Weights
 from kop_exudyn.structures.base import design_from_dict
 
 

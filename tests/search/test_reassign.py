@@ -15,7 +15,6 @@ from kop_exudyn.search import assigned as rounds
 from kop_exudyn.search import reassign as reassigning
 from kop_exudyn.search.assigned import assigned_stage
 from kop_exudyn.search.dataset import Dataset
-from kop_exudyn.search.objective import Weights
 from kop_exudyn.search.opening import opened_stage
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.problems import AssignedProblem
@@ -23,6 +22,7 @@ from kop_exudyn.search.reassign import LocalModel, keep_parts, reassign
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.search.stages import Stages
+from kop_exudyn.search.weights import Weights
 from kop_exudyn.sqp.constraints import on_elements
 from kop_exudyn.structures.base import design_from_dict
 

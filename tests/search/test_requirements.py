@@ -10,11 +10,12 @@ from kop_exudyn.search.dataset import (
     evaluations_from_arrays,
     evaluations_to_arrays,
 )
-from kop_exudyn.search.objective import DesignObjective, Weights
+from kop_exudyn.search.objective import DesignObjective
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.settings import StageSettings
 from kop_exudyn.search.stages import Stages
+from kop_exudyn.search.weights import Weights
 from kop_exudyn.structures.opening import SAME_STATE
 
 PARTS = {"linear": 4, "angular": 2}

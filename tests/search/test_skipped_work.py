@@ -15,10 +15,12 @@ from kop_exudyn.kit.cluster import cluster
 from kop_exudyn.kit.projection import Projection
 from kop_exudyn.search import objective
 from kop_exudyn.search.dataset import Dataset
-from kop_exudyn.search.objective import DesignObjective, Weights
+from kop_exudyn.search.objective import DesignObjective
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.problems import RelaxedProblem
-from kop_exudyn.sqp.solver import SQPOptions, minimise
+from kop_exudyn.search.weights import Weights
+from kop_exudyn.sqp.options import SQPOptions
+from kop_exudyn.sqp.solver import minimise
 from kop_exudyn.structures.base import design_from_dict
 
 COUNTED = [

@@ -10,10 +10,11 @@ from support.settings import FEW_ERRORS, FEW_STEPS
 from kop_exudyn.equilibrium.newton import NewtonOptions
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.designs import load_design
-from kop_exudyn.search.objective import DesignObjective, Weights
+from kop_exudyn.search.objective import DesignObjective
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.search.terms import base
+from kop_exudyn.search.weights import Weights
 from kop_exudyn.structures.base import design_from_dict
 
 TIGHT = NewtonOptions(max_iterations=80, tolerance=1e-13)

@@ -11,9 +11,10 @@ from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.sqp.constraints import LinearConstraints
 from kop_exudyn.sqp.history import SQPState
 from kop_exudyn.sqp.model import Region, build_model, minimise_model
+from kop_exudyn.sqp.options import SQPOptions
 from kop_exudyn.sqp.problem import Derivatives, Inequalities, Point
 from kop_exudyn.sqp.qp import QPSolver
-from kop_exudyn.sqp.solver import SQPOptions, minimise
+from kop_exudyn.sqp.solver import minimise
 
 
 class Disc:

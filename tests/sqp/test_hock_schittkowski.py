@@ -13,8 +13,9 @@ import scipy.sparse as sp
 from scipy.optimize import Bounds, LinearConstraint, minimize
 
 from kop_exudyn.sqp.constraints import LinearConstraints
+from kop_exudyn.sqp.options import SQPOptions
 from kop_exudyn.sqp.problem import Derivatives, Point
-from kop_exudyn.sqp.solver import SQPOptions, minimise
+from kop_exudyn.sqp.solver import minimise
 
 INF = np.inf
 ROOT3 = np.sqrt(3.0)

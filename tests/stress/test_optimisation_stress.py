@@ -15,7 +15,7 @@ from support.settings import FEW_ERRORS
 from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.kit.parts import Kit
 from kop_exudyn.search import pool
-from kop_exudyn.search.objective import Evaluation
+from kop_exudyn.search.evaluation import Evaluation
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
 from lib.stress.arch import Arch, arches

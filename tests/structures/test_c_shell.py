@@ -15,7 +15,8 @@ from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.errors import InputError
 from kop_exudyn.geometry.extent import size_of_points
 from kop_exudyn.search.input_fit import fit_input
-from kop_exudyn.search.objective import DesignObjective, Weights
+from kop_exudyn.search.objective import DesignObjective
+from kop_exudyn.search.weights import Weights
 from kop_exudyn.structures.base import design_from_dict
 
 SMALL = 5  # joints a side

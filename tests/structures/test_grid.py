@@ -20,7 +20,8 @@ from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.geometry.extent import size_of_points
 from kop_exudyn.io.datasets import load_designs
 from kop_exudyn.io.designs import load_design
-from kop_exudyn.search.objective import DesignObjective, Weights
+from kop_exudyn.search.objective import DesignObjective
+from kop_exudyn.search.weights import Weights
 from kop_exudyn.structures.base import design_from_dict
 from kop_exudyn.structures.fitting import TargetFitting
 from kop_exudyn.structures.grid.c_mesh import c_mesh_residuals

@@ -15,7 +15,8 @@ from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.files.documents import check_schema
 from kop_exudyn.geometry.extent import size_of_points
 from kop_exudyn.scene.actuators import LinearActuators
-from kop_exudyn.search.objective import DesignObjective, Weights
+from kop_exudyn.search.objective import DesignObjective
+from kop_exudyn.search.weights import Weights
 from kop_exudyn.structures.base import design_from_dict
 from kop_exudyn.structures.umbrella.generator import (
     design_on_surface,

@@ -10,10 +10,10 @@ from typing import Any
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.events import StageEvent
-from kop_exudyn.search.objective import Weights
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.settings import StageSettings
 from kop_exudyn.search.stages import Stages
+from kop_exudyn.search.weights import Weights
 
 
 def shell_data(name: str, bow: float = 0.1, **changes: Any) -> dict[str, Any]:

@@ -19,8 +19,8 @@ from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.files.arrays import load_arrays, save_arrays, sealed, unsealed
 from kop_exudyn.io.saved_runs import saved_equilibrium
 from kop_exudyn.search.dataset import Dataset, evaluations_from_arrays, evaluations_to_arrays
-from kop_exudyn.search.objective import Weights
 from kop_exudyn.search.pool import DesignPool
+from kop_exudyn.search.weights import Weights
 from kop_exudyn.sqp.history import SQPState
 
 from .arch import arches
