@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
 from typing import Any
+from weakref import WeakSet
 
 import numpy as np
 
@@ -63,6 +65,17 @@ class Closest:
         )
 
 
+# libigl complains of trees that are left when the process ends, as they are where surfaces belong
+# to cycles of objects and garbage isn't looked for any more.
+_WITH_TREES: WeakSet[TriangleSurface] = WeakSet()
+
+
+@atexit.register
+def _without_trees() -> None:
+    for surface in list(_WITH_TREES):
+        vars(surface).pop("_tree", None)
+
+
 class TriangleSurface:
     """A triangle mesh with its search tree, built once.
 
@@ -106,6 +119,7 @@ class TriangleSurface:
 
         tree = igl.AABB()
         tree.init(self.vertices, self.faces)
+        _WITH_TREES.add(self)
         return tree
 
     def __getstate__(self) -> dict[str, Any]:

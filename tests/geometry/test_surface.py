@@ -2,6 +2,8 @@
 meshes."""
 
 import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -153,3 +155,20 @@ def test_unusable_meshes(vertices, faces, message):
 def test_unusable_points():
     with pytest.raises(InputError, match="finite points"):
         ROOF.closest(np.array([[0, 0, np.inf]]))
+
+
+def test_search_trees_are_gone_when_the_process_ends():
+    """Of surfaces in cycles of objects, too, where garbage is no longer looked for: kop optimize
+    ended with fifty lines of complaints."""
+    script = """
+import atexit, gc
+import numpy as np
+from kop_exudyn.geometry.triangles import TriangleSurface
+
+surface = TriangleSurface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+surface.closest(np.zeros((1, 3)))
+surface.itself = surface
+atexit.register(gc.freeze)
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
