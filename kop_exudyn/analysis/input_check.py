@@ -38,7 +38,7 @@ _RESTARTS = 3
 class ElementCost:
     """One element far from its part.
 
-    kind, number : the element, counted in its design and kind
+    kind, number : the element, numbered from 1 within its design as in assembly plans
     parameters : its lengths or its angle; part : those of the nearest part
     percent : of the whole projection energy
     """
@@ -275,6 +275,17 @@ def _length_ratio(design: Design, designs: Sequence[Design]) -> float | None:
     return float(np.median(own) / np.median(others))
 
 
+def _numbers(design: Design, kind: str) -> list[int]:
+    """Numbers of a design's elements of one kind, in the order of its groups."""
+    found: list[int] = []
+    first = 1
+    for group in design.groups:
+        end = first + len(group.indices)
+        found += range(first, end) if group.kind == kind else ()
+        first = end
+    return found
+
+
 def _add_shares(
     checks: Sequence[DesignCheck],
     designs: Sequence[Design],
@@ -302,7 +313,7 @@ def _add_shares(
             dearest[number].append(
                 ElementCost(
                     group.kind,
-                    first + int(k),
+                    _numbers(designs[number], group.kind)[first + int(k)],
                     q[group.indices[k]].tolist(),
                     found.kit[group.kind][part[k]].tolist(),
                     float(percent[k]),
