@@ -17,6 +17,7 @@ from time import perf_counter
 from .checkpoints import PrefixedStore, Store
 from .dataset import Dataset
 from .events import Observer
+from .path import to_parts
 from .requirements import Requirements
 from .settings import StageSettings
 from .stage_results import StageResult
@@ -69,7 +70,7 @@ def published_method(
     kit, _ = stages.rule.first(dataset.groups, stages.q0, stages.projection, own)
     begin = perf_counter()
     announce("published method: relaxed stage")
-    relaxed, built = stages.to_parts(stages.relaxed(kit))
+    relaxed, built = to_parts(stages, stages.relaxed(kit))
     announce("published method: assigned stage")
     led = stages.confirmed(stages.assigned(built))
     seconds = perf_counter() - begin

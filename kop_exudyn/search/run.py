@@ -36,6 +36,7 @@ from .forgiving import proven
 from .levelling import level
 from .neighbours import resized
 from .opening import opened_stage
+from .path import from_neighbour, to_parts
 from .pool import DesignPool
 from .published import published_method
 from .requirements import Requirements
@@ -119,7 +120,7 @@ def optimize_kit(
             result.at_parts = stages.confirmed(resized(stages, start, dict(parts or {})))
         elif start is not None:
             announce("path from the neighbouring kit")
-            result.at_parts = stages.from_neighbour(np.concatenate(list(start)))
+            result.at_parts = from_neighbour(stages, np.concatenate(list(start)))
         else:
             announce("direct projection")
             found["direct"] = baselines.direct()
@@ -141,7 +142,7 @@ def optimize_kit(
             announce("relaxed stage")
             relaxed = stages.relaxed(found["direct"].kit)
             announce("path to the parts")
-            found["relaxed"], result.at_parts = stages.to_parts(relaxed)
+            found["relaxed"], result.at_parts = to_parts(stages, relaxed)
         announce("assigned stage")
         bases = []
         if "relaxed" in found and all(isinstance(d, Evaluation) for d in found["relaxed"].designs):

@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import InputError, SimulationFailure
-from ..kit.cluster import cluster
 from ..kit.kinds import part_kind
 from ..kit.part_costs import PartCosts
 from ..kit.parts import Assignment, Kit
@@ -78,7 +77,7 @@ class Stages:
         kit, assignment = self.rule.first(
             self.dataset.groups, self.q0, self.projection, self.settings
         )
-        return self.confirmed(self.built_from(self._limited(kit), assignment, self.inputs()))
+        return self.confirmed(self.built_from(self.limited(kit), assignment, self.inputs()))
 
     @property
     def optimises(self) -> bool:
@@ -103,7 +102,7 @@ class Stages:
         settings, evaluations = self.settings, list(start or self.inputs())
         steps, q = 0, np.concatenate([e.q for e in evaluations])
         for weight in self.schedule:
-            result, problem = self._relax(f"relaxed-{weight:g}", weight, q, evaluations, kit)
+            result, problem = self.relaxed_at(f"relaxed-{weight:g}", weight, q, evaluations, kit)
             q, evaluations, kit = result.x, result.point.data.evaluations, result.point.data.kit
             steps += result.steps
             if (
@@ -335,87 +334,8 @@ class Stages:
         """The states that a result's designs open into from their assembly."""
         return self.judged(replace(result, designs=self.redeployed(result)))
 
-    def to_parts(self, relaxed: StageResult) -> tuple[StageResult, StageResult]:
-        """Follow the straight path from the relaxed elements to their parts, watching for snaps.
-
-        When a design fails, w_c is raised and the relaxed stage goes on from where it was; also
-        when one snaps, unless the rounds of the assigned stage are to make up for that. Returns the
-        relaxed result that the path started from in the end, and the state at the parts.
-        """
-        settings = self.settings
-        attempts = settings.rescues + self.rule.growth(settings)
-        for attempt in range(attempts + 1):
-            kit = self._limited(relaxed.kit)
-            designs, jumps = self._to_parts(relaxed.evaluations, kit, relaxed.assignment)
-            failed = [d for d in designs if isinstance(d, SimulationFailure)]
-            for jump in jumps:
-                log.warning(
-                    "%s snaps at %.0f %% of the way to its parts (%.1f %% of its size)",
-                    jump.design,
-                    100 * jump.fraction,
-                    100 * jump.distance,
-                )
-            for failure in failed:
-                log.warning("%s", failure)
-            needed = failed or jumps and not settings.reassignments
-            if not needed or attempt == attempts:
-                break
-            relaxed = self._rescued(relaxed, attempt, jumps)
-        return relaxed, self.confirmed(self._result(designs, kit, relaxed.assignment, jumps=jumps))
-
-    def from_neighbour(self, q: np.ndarray) -> StageResult:
-        """The designs led to the elements q (n_q,) of another kit, and from there to the parts that
-        suit these best; a design that fails on the first way starts from its input."""
-        inputs = self.inputs()
-        paths = self.dataset.follow(q, inputs, self.settings.path_steps)
-        start = [
-            first if isinstance(path, SimulationFailure) else path[-1]
-            for first, path in zip(inputs, paths)
-        ]
-        there = np.concatenate([evaluation.q for evaluation in start])
-        kit, assignment = self.rule.first(
-            self.dataset.groups, there, self.projection, self.settings
-        )
-        return self.confirmed(self.built_from(self._limited(kit), assignment, start))
-
-    def _rescued(self, relaxed: StageResult, attempt: int, jumps: list[Jump]) -> StageResult:
-        """The relaxed stage again from its end: with w_c raised, later with one more part of every
-        kind."""
-        settings, kit, q = (
-            self.settings,
-            relaxed.kit,
-            np.concatenate([e.q for e in relaxed.evaluations]),
-        )
-        if attempt < settings.rescues:
-            weight = self.schedule[-1] * 10 ** (attempt + 1)
-            log.warning("raising w_c to %g", weight)
-        else:
-            weight = self.schedule[-1]
-            sizes = {kind: count + 1 for kind, count in kit.sizes.items()}
-            log.warning("one more part of every kind: %s", sizes)
-            kit = cluster(
-                self.dataset.groups,
-                q,
-                sizes,
-                bounds=settings.bounds,
-                restarts=settings.restarts,
-                seed=settings.seed,
-                penalties=self.projection.penalties,
-            ).kit
-        result, _ = self._relax(f"rescue-{attempt + 1}", weight, q, relaxed.evaluations, kit)
-        data = result.point.data
-        return StageResult(
-            list(data.evaluations),
-            data.kit,
-            data.assignment,
-            relaxed.steps + result.steps,
-            result.point.value,
-            result.status,
-            relaxed.jumps + jumps,
-        )
-
     # -- pieces --------------------------------------------------------------------------------
-    def _relax(
+    def relaxed_at(
         self,
         name: str,
         weight: float,
@@ -423,6 +343,11 @@ class Stages:
         evaluations: Sequence[Evaluation],
         kit: Kit,
     ) -> tuple[SQPResult, RelaxedProblem]:
+        """Minimise over all elements at one weight, from elements q (n_q,) and their
+        evaluations.
+
+        name : of the SQP; weight : w_c; kit : whose parts the elements are drawn to
+        """
         settings = self.settings
         problem = RelaxedProblem(
             self.dataset,
@@ -457,7 +382,7 @@ class Stages:
         q[self.dataset.free] = free
         return assignment.realise(kit, q)
 
-    def _limited(self, kit: Kit) -> Kit:
+    def limited(self, kit: Kit) -> Kit:
         """A kit that is sought, whose parts keep to their own limits; a given one as it is."""
         kinds = [name for name in kit.parts if part_kind(name).limits is not None]
         if not kinds or not self.rule.parts_move:

@@ -20,6 +20,7 @@ from kop_exudyn.report.designs import DrawnState
 from kop_exudyn.report.kit_drawings import drawn_state
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.events import StageEvent
+from kop_exudyn.search.path import to_parts
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.settings import StageSettings
 from kop_exudyn.search.stage_results import StageResult
@@ -68,7 +69,7 @@ def path_case(
         if not fails(case):
             return case
         attempts.clear()
-        rescued, _ = stages.to_parts(relaxed)
+        rescued, _ = to_parts(stages, relaxed)
         path = watch(dataset, rescued, path_steps)[0]
         reached = max(attempts.values(), default=weight)
         return case | {"rescue": _followed(subject, path, rescued, reached)}

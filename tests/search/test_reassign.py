@@ -16,6 +16,7 @@ from kop_exudyn.search import reassign as reassigning
 from kop_exudyn.search.assigned import assigned_stage
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.opening import opened_stage
+from kop_exudyn.search.path import to_parts
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.problems import AssignedProblem
 from kop_exudyn.search.reassign import LocalModel, keep_parts, reassign
@@ -282,7 +283,7 @@ def test_a_design_that_snaps_is_rescued_by_weight_then_by_parts(stages, direct, 
     monkeypatch.setattr(module, "find_jump", lambda design, *rest: Jump(design.name, 0.5, 0.1))
     settings = StageSettings(schedule=(1e3,), relaxed_steps=2, reassignments=0, rescues=1, growth=2)
     paper = Stages(stages.dataset, PARTS, settings)
-    relaxed, at_parts = paper.to_parts(paper.relaxed(direct.kit))
+    relaxed, at_parts = to_parts(paper, paper.relaxed(direct.kit))
     assert at_parts.kit.sizes == {kind: count + 2 for kind, count in PARTS.items()}
     assert len(relaxed.jumps) == 3 * 2 and len(at_parts.jumps) == 2
     assert np.isfinite(at_parts.value)
