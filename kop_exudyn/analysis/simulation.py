@@ -201,7 +201,7 @@ def simulate(design: Design, loads: LoadCase | None = None, engine: str = FAST) 
         log.warning("%s: %s", design.name, doubt)
     fitted = design.fitted_role.name
     joints = design.report_positions(confirmations[fitted].state)
-    fit = TargetFitting(target)(confirmations[fitted].state.positions[design.joints])
+    fit = TargetFitting(target).minimum_zone(confirmations[fitted].state.positions[design.joints])
     system = design.systems[fitted]
     loaded: LoadedState | None = None
     checks: tuple[LoadCheck, ...] = ()

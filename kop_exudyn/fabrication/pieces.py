@@ -195,7 +195,11 @@ def parts_list_of(result: KitResult) -> PartsList:
         of_roles = {role: eq.state for role, eq in each.equilibria.items()}
         role = design.fitted_role.name
         joints = of_roles[role].positions[design.joints]
-        fit = each.fit if isinstance(each, Evaluation) else TargetFitting(each.target)(joints)
+        fit = (
+            each.fit
+            if isinstance(each, Evaluation)
+            else TargetFitting(each.target).minimum_zone(joints)
+        )
         of_roles[role] = of_roles[role].transformed(
             fit.placement.rotation, fit.placement.translation
         )

@@ -186,7 +186,7 @@ class _Drawing:
             if role != fitted:
                 found.append(self._state(stage, role, equilibrium))
                 continue
-            fit = self.fitting(equilibrium.state.positions[self.design.joints])
+            fit = self.fitting.minimum_zone(equilibrium.state.positions[self.design.joints])
             state = self._state(stage, role, equilibrium, fit.placement)
             off = self._off(fit, equilibrium)
             found.append(replace(state, note=" · ".join(filter(None, (off, state.note)))))

@@ -88,6 +88,7 @@ def further_rounds(
     numbers: Iterator[int],
     label: Callable[[int], SQPLabel] = SQPLabel.of_round,
     seen: list[StageResult] | None = None,
+    optimised: bool = True,
 ) -> StageResult:
     """Reassigned and optimised in turns from where an SQP came to its end, with the rounds' own
     tolerances; not confirmed yet.
@@ -95,12 +96,14 @@ def further_rounds(
     In secured stages an SQP ends where one of the designs is about to open elsewhere; with other
     parts for some of its elements it often can go on.
 
-    label : of the SQP of a number; seen : gets the results on the way
+    label : of the SQP of a number
+    seen : gets the results on the way
+    optimised : whether the parts are at their best already, for this assignment
     """
     if not stages.settings.reassignments or start.value is None:
         return start
     rounds = _Rounds(stages, numbers, start.steps, [] if seen is None else seen, label)
-    best = rounds.alternated(start, stages.settings.reassignments, optimised=True)
+    best = rounds.alternated(start, stages.settings.reassignments, optimised)
     return replace(best, steps=rounds.steps, jumps=start.jumps)
 
 

@@ -54,6 +54,7 @@ class Dataset:
     numbers : which of the pool's designs
     design_weights : how much each of these counts
     requirements : that designs have to meet
+    exempt : those of the pool's designs that errors of the workshop may make snap nevertheless
     tally : counts what was solved
     """
 
@@ -63,6 +64,7 @@ class Dataset:
     design_weights: tuple[float, ...]
     requirements: Requirements = Requirements.none()
     tally: Tally = field(default_factory=Tally)
+    exempt: frozenset[int] = frozenset()
 
     @classmethod
     def of_pool(
@@ -305,7 +307,8 @@ class Dataset:
         ask for that, see `forgives`."""
         if not self.requirements.samples:
             return []
-        told = self._map(forgives, {n: (e,) for n, e in evaluations.items()})
+        asked = {n: e for n, e in evaluations.items() if self.numbers[n] not in self.exempt}
+        told = self._map(forgives, {n: (e,) for n, e in asked.items()})
         return [n for n, forgiving in told.items() if forgiving is not True]
 
     def judge(

@@ -11,25 +11,18 @@ import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from .assigned import further_rounds
 from .events import SQPLabel
-from .reassign import LocalModel, improved, keep_parts
-from .shaking import shaken
-from .stage_results import StageResult, all_same, combined
+from .remaking import NEAR, made_otherwise
+from .stage_results import StageResult, all_same
 from .stages import Stages
 
 log = logging.getLogger(__name__)
 
 # times the weights of stress and energy, where a design snaps
 _CALMER = (3.0, 10.0, 30.0)
-_NEAR = 1.5  # times J: results above that are no substitute
 DEAR = 1.1  # times J: where what was found is above that, the last resorts are tried as well
 _LOOKED_AT = 12  # results on the way, at most
-_WAYS = 12  # to make a design, that are tried at most
-_SHAKEN = 0.01  # of its elements
-_DAMPING = 1e-2  # of the model that these follow
 
 
 def forgiving_stage(
@@ -64,7 +57,7 @@ def forgiving_stage(
         found.append(secured_steps(stages, other, numbers, forgiving=True))
     mended, still = best, lost
     if not found and last_resorts:
-        mended, still = made_otherwise(stages, best, lost)
+        mended, still = made_otherwise(stages, best, lost, dear=True)
         if not still:
             found.append(secured_steps(stages, mended, numbers, forgiving=True))
     steps = best.steps
@@ -99,16 +92,16 @@ def proven(stages: Stages, result: StageResult) -> StageResult:
     """A result that forgives, tried with more sets of errors; designs that snap in one of them are
     made of the same parts otherwise, where that helps and costs little: what is one set in many to
     the workshop isn't worth a shape that is far off."""
-    if result.value is None or result.snapping:
+    if result.value is None:
         return result
     proving = stages.proving()
     lost = proving.snapping(result)
     if not lost:
-        return result
+        return replace(result, snapping=()) if result.snapping else result
     names = [stages.dataset.designs[n].name for n in lost]
     log.info("in more sets of errors %s snap", ", ".join(names))
-    near = 1 + (_NEAR - 1) / len(result.designs)
-    return made_otherwise(proving, result, lost, near)[0]
+    mended, still = made_otherwise(proving, result, lost)
+    return result if mended is result else replace(mended, snapping=still)
 
 
 def substitute(
@@ -116,7 +109,7 @@ def substitute(
 ) -> StageResult | None:
     """The best of other results that opens into about as good states and forgives; None without
     one."""
-    limit = _NEAR * value_of(best)
+    limit = NEAR * value_of(best)
     near = sorted((other for other in others if value_of(other) <= limit), key=value_of)
     for number, other in enumerate(near[:_LOOKED_AT]):
         opened = stages.secured().kept(other)
@@ -125,56 +118,6 @@ def substitute(
         log.info("the result on the way number %d forgives, at J = %.5g", number, value_of(opened))
         return opened
     return None
-
-
-def made_otherwise(
-    stages: Stages, result: StageResult, lost: Sequence[int], near: float = _NEAR
-) -> tuple[StageResult, tuple[int, ...]]:
-    """The result with other parts, of the same kit, for the elements of designs that snap; and the
-    designs that still do.
-
-    With the parts as they are, designs don't depend on each other. A share of a design's elements
-    get any other parts, and then all those that the model prefers: another local minimum, of which
-    there are many. Each is opened and tried with errors.
-
-    lost : the designs that snap; near : times J, above which nothing is a substitute
-    """
-    still = tuple(lost)
-    if stages.rule.stock is not None or len(stages.dataset.sliding):
-        return result, still
-    dataset, limit = stages.dataset, near * value_of(result)
-    derivatives = dataset.derivatives(result.evaluations, hessian=True)
-    scales = dataset.split(dataset.scales())
-    model = LocalModel.of(derivatives, dataset.design_weights, scales, _DAMPING)
-    for n in lost:
-        rng = np.random.default_rng([stages.settings.seed, n])
-        own = [g for g, design in enumerate(dataset.group_designs) if design == n]
-        others = [k for k in range(len(result.designs)) if k != n]
-        ways = []
-        for _ in range(_WAYS):
-            problem = stages.assigned_problem(result, range(len(result.designs)))
-            start = shaken(result.assignment, result.kit, rng, own, _SHAKEN)
-            found = improved(problem.reassigned(start), model, others, keep_parts)
-            if found is not None and found.assignment.changes(result.assignment):
-                ways.append(found)
-        for way in sorted(ways, key=lambda way: way.total):
-            steps = (stages.settings.path_steps + 1) // 2
-            trial = stages.built_from(
-                way.kit, way.assignment, result.evaluations, way.free, steps, watched=False
-            )
-            chosen = [trial if k == n else result for k in range(len(result.designs))]
-            opened = stages.secured().kept(stages.judged(combined(chosen, dataset)))
-            if value_of(opened) <= limit and n not in stages.snapping_among(opened, [n]):
-                log.info(
-                    "%s made of other parts forgives: J = %.5g, from %.5g",
-                    dataset.designs[n].name,
-                    value_of(opened),
-                    value_of(result),
-                )
-                result = replace(opened, steps=result.steps, status=result.status)
-                still = tuple(k for k in still if k != n)
-                break
-    return result, still
 
 
 def secured_steps(

@@ -15,14 +15,15 @@ from dataclasses import replace
 
 from .assigned import further_rounds
 from .events import SQPLabel
-from .forgiving import made_otherwise
 from .objective import Evaluation
+from .remaking import made_better, made_otherwise
 from .stage_results import StageResult, all_same
 from .stages import Stages
 
 log = logging.getLogger(__name__)
 
 _LOOKED_AT = 6  # results on the way, at most
+_REMAKINGS = 3  # rounds in which designs that are far off are made of other parts, at most
 _FELT = 5.0  # times the level: where the largest deviation is beyond that, other parts are tried
 
 
@@ -39,7 +40,8 @@ def level(stages: Stages, result: StageResult, numbers: Iterator[int]) -> StageR
     share = stages.settings.levelling
     if not share or not stages.optimises or result.value is None:
         return result
-    settings, secured = stages.settings, stages.secured(forgiving=not result.snapping)
+    before = stages.confirmed(result)  # and placed best
+    settings, secured = stages.settings, stages.secured(forgiving=True, but=result.snapping)
     levelled = secured.levelled(share)
     start = levelled.kept(levelled.weighed(result))
     if start.value is None:
@@ -47,23 +49,42 @@ def level(stages: Stages, result: StageResult, numbers: Iterator[int]) -> StageR
     label = SQPLabel.of_levelling(next(numbers))
     end = levelled.assigned(start, label, settings.round_steps, settings.round_tolerance)
     ends, steps = [end], result.steps + end.steps
-    if worst(end.designs) > 100 * _FELT * share:
-        careful = stages.careful().secured(forgiving=not result.snapping).levelled(share)
+    felt = 100 * _FELT * share
+    if worst(end.designs) > felt:
+        careful = stages.careful().secured(forgiving=True, but=result.snapping).levelled(share)
         last = further_rounds(careful, end, numbers, SQPLabel.of_levelling, ends)
         ends.append(last)
+        for number in range(_REMAKINGS):
+            far = _far(last, felt)
+            better = made_better(careful, last, far, number) if far else last
+            if better is last:
+                break
+            ends.append(better)
+            last = further_rounds(careful, better, numbers, SQPLabel.of_levelling, ends, False)
+            ends.append(last)
         steps = result.steps + last.steps
     for trial in sorted(ends, key=lambda one: worst(one.designs))[:_LOOKED_AT]:
-        found = _proved(stages, secured.weighed(trial), result)
+        found = _proved(stages, secured.weighed(trial), before)
         if found is not None:
             log.info(
                 "largest deviation %.3g %%, from %.3g %%, at J = %.5g, from %.5g",
                 worst(found.designs),
-                worst(result.designs),
+                worst(before.designs),
                 found.value,
                 result.value,
             )
             return replace(found, steps=steps, jumps=result.jumps)
     return replace(result, steps=steps)
+
+
+def _far(result: StageResult, felt: float) -> list[int]:
+    """The designs of which a joint is farther off than is felt, %, the worst first."""
+    off = {
+        n: design.fit.max_percent
+        for n, design in enumerate(result.designs)
+        if isinstance(design, Evaluation) and design.fit.max_percent > felt
+    }
+    return sorted(off, key=lambda n: -off[n])
 
 
 def _proved(stages: Stages, found: StageResult, before: StageResult) -> StageResult | None:

@@ -22,7 +22,11 @@ from ..equilibrium.newton import NewtonOptions, refine, solve
 from ..equilibrium.sensitivities import Sensitivities
 from ..errors import InputError, SimulationFailure
 from ..structures.base import Design
+<<<<<<< HEAD
 from ..structures.fitting import TargetFitting, best_placement
+=======
+from ..structures.fitting import FitResult, Placement, TargetFitting, best_placement
+>>>>>>> adab041 (Deviations at the placement where the largest one is least; designs far off or snapping are made of the same parts otherwise)
 from ..structures.load_bound import LoadBound
 from ..structures.opening import SAME_STATE
 from ..structures.stress_bound import NEAR, Rows, StressBound
@@ -195,11 +199,11 @@ class DesignObjective:
         )
 
     def apart(self, a: Evaluation, b: Evaluation) -> float:
-        """The largest distance of a joint in two states, each at its best placement on the target,
-        as a share of the size."""
+        """The largest distance of a joint in two states, each placed where its T is least, as a
+        share of the size."""
         role = self.design.fitted_role.name
         x, y = (
-            e.fit.placement.apply(e.equilibria[role].state.positions[self.design.joints])
+            e.fit.fitted.apply(e.equilibria[role].state.positions[self.design.joints])
             for e in (a, b)
         )
         return float(np.linalg.norm(x - y, axis=1).max()) / a.fit.size
@@ -249,8 +253,8 @@ class DesignObjective:
         return found
 
     def confirm(self, evaluation: Evaluation) -> Evaluation:
-        """The same evaluation at Exudyn's own solutions; SimulationFailure where Exudyn doesn't
-        confirm one."""
+        """The same evaluation at Exudyn's own solutions, placed where its largest deviation is
+        least; SimulationFailure where Exudyn doesn't confirm one."""
         if evaluation.confirmations:
             return evaluation
         evaluation = self._refined(evaluation)
@@ -265,7 +269,26 @@ class DesignObjective:
             except SimulationFailure as failure:
                 raise failure.within(f"{self.design.name}: {name} state") from None
             equilibria[name] = replace(refined, state=confirmations[name].state)
-        return replace(evaluation, equilibria=equilibria, confirmations=confirmations)
+        fitted = equilibria[self.design.fitted_role.name]
+        joints = fitted.state.positions[self.design.joints]
+        return replace(
+            evaluation,
+            fit=self._fitting.minimum_zone(joints, evaluation.fit),
+            equilibria=equilibria,
+            confirmations=confirmations,
+        )
+
+    def deviation_near(self, evaluation: Evaluation, near: Evaluation) -> float:
+        """The largest deviation of a state where it is placed best, % of the size.
+
+        near : another state of the design, whose placement is known
+        """
+        role, joints = self.design.fitted_role.name, self.design.joints
+        x, y = (e.equilibria[role].state.positions[joints] for e in (evaluation, near))
+        onto = best_placement(x, y, np.full(len(x), 1 / len(x)))
+        place = near.fit.placement
+        start = Placement(place.rotation @ onto.rotation, place.apply(onto.translation[None])[0])
+        return self._fitting.minimum_zone(x, replace(evaluation.fit, placement=start)).max_percent
 
     def _refined(self, evaluation: Evaluation) -> Evaluation:
         """The same evaluation with its states converged to round-off."""
@@ -294,7 +317,10 @@ class DesignObjective:
 
     def approach(self, q: np.ndarray, previous: Evaluation, steps: int) -> list[Evaluation]:
         """As `follow`, in no more steps than the way asks for: as many as keep the joints'
-        predicted movement in each below 0.2 % of the size; in all of them where that fails."""
+        predicted movement in each below 0.2 % of the size; in all of them where that fails. Where
+        the elements stay as they are, so does the evaluation."""
+        if np.array_equal(q, previous.q):
+            return [replace(previous, iterations=0, solves=0)]
         fewer = min(steps, max(1, int(np.ceil(self._moved(q, previous) / _REACH))))
         try:
             return self.follow(q, previous, fewer)

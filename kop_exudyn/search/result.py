@@ -121,7 +121,7 @@ class KitResult:
         for."""
         design, reference = self.designs[number], self.references[number]
         state = reference.equilibria[design.fitted_role.name].state
-        fit = TargetFitting(reference.target)(state.positions[design.joints])
+        fit = TargetFitting(reference.target).minimum_zone(state.positions[design.joints])
         return {
             "fit": fit_summary(design, reference.target, fit, state),
             "elastic_energy": reference.energy,

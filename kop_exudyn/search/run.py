@@ -184,10 +184,10 @@ def _levelled(stages: Stages, result: StageResult) -> StageResult:
     """The result levelled, or as it is, proved with more errors."""
     numbers = count(1)
     found = level(stages, result, numbers)
-    if found.designs is not result.designs:  # has been proved already
+    if found.designs is not result.designs and not found.snapping:  # has been proved already
         return found
-    mended = proven(stages, result)
-    return mended if mended is result else level(stages, mended, numbers)
+    mended = proven(stages, found)
+    return mended if mended is found else level(stages, mended, numbers)
 
 
 def _confirmed(stages: Stages, outcome: StageResult) -> StageResult:

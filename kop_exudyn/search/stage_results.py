@@ -99,12 +99,10 @@ def distance(design: Design, a: Evaluation, b: Evaluation) -> float:
     """How far apart two states of a design are: the largest distance of a joint, as a share of the
     bounding box.
 
-    Each state is at its best placement on the target.
+    Each state is at the placement of its least T on the target.
     """
     role = design.fitted_role.name
-    joints = [
-        e.fit.placement.apply(e.equilibria[role].state.positions[design.joints]) for e in (a, b)
-    ]
+    joints = [e.fit.fitted.apply(e.equilibria[role].state.positions[design.joints]) for e in (a, b)]
     return float(np.linalg.norm(joints[0] - joints[1], axis=1).max()) / a.fit.size
 
 

@@ -248,15 +248,18 @@ class Stages:
             found.append(self.confirmed(result))
         return found[-1] if found[-1].value is not None else found[0]
 
-    def secured(self, forgiving: bool = False) -> Stages:
+    def secured(self, forgiving: bool = False, but: Sequence[int] = ()) -> Stages:
         """The same stages with designs kept on the branch along which they open: reassigned ones
         are judged where they open into, and steps that leave the branch are refused.
 
         forgiving : steps to where errors of the workshop make a design snap are refused as well
+        but : designs that may snap nevertheless, as they do already
         """
         other = copy(self)
         samples = self.required.samples if forgiving else 0
-        other.dataset = self.dataset.requiring(replace(self.required, samples=samples))
+        exempt = frozenset(self.dataset.numbers[n] for n in but)
+        required = replace(self.required, samples=samples)
+        other.dataset = replace(self.dataset, requirements=required, exempt=exempt)
         return other
 
     def careful(self) -> Stages:

@@ -160,7 +160,7 @@ def _samples(
         yield Sample(
             errors,
             moved,
-            found.fit.max_percent,
+            objective.deviation_near(found, evaluation),
             snapped=bool(away and _stays_away(objective, found, evaluation)),
             confirmed=asked,
         )

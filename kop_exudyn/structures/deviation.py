@@ -1,8 +1,8 @@
 """How far a built design is from its target: its joints, and the pieces between them.
 
 Joints may all lie on the target while the corners between them stand off it: what is built is both.
-Distances are from the target's surface, at the placement in space that fits the joints best. They
-are given in the design's unit of length and in percent of the target's size.
+Distances are from the target's surface, at the placement in space for which the largest one of the
+joints is least. They are given in the design's unit of length and in percent of the target's size.
 """
 
 from __future__ import annotations

@@ -5,11 +5,14 @@ T(x) = share sum_i w_i |y_i - x*_i|^2 + (1 - share) sum_i w_i |y_i - P(y_i)|^2, 
 placements y = R x + t, with P the closest point on the surface and weights w that sum to one. As
 the placement is a minimiser, the gradient in x needs no derivative of it; the Hessian does, by
 Schur complement. Large distances can be given more weight by a fourth power.
+
+T is what a search minimises. What is built may be set up anywhere, and what is told of its form is
+the largest distance from the surface, placed so that this is least (the minimum zone of ISO 1101).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +26,11 @@ from .base import Target
 _MAX_ITERATIONS = 100
 # of the joints' size; Newton converges quadratically, the step after that is round-off
 _STEP_TOLERANCE = 1e-10
+# powers of the distances by which the largest one is brought down: each begins where the last ended
+_POWERS = (4, 8, 16, 32, 64)
+# weight of the joints' own places beside these, or they would slide along a surface at will
+_ZONE_SHARE = 1e-2
+_ON_SURFACE = 1e-9  # of the size
 # relative: rigid motions that no residual sees, as turning collinear joints about their line
 _DEGENERATE = 1e-10
 
@@ -50,14 +58,16 @@ class Placement:
 class FitResult:
     """Target fitting of n joints.
 
-    value : T, length^2
+    value : T, length^2, at the placement for which it is least
     gradient : (n, 3) dT/dx in the coordinates that the joints were given in
-    placement : the best one
+    placement : the one for which T is least, or where the largest distance is
+        (`TargetFitting.minimum_zone`)
     distances : (n,) of the placed joints from the surface
     displacements : (n,) of the placed joints from their own places in the target
     size : of the target, which percentages refer to
     blocks : (n, 3, 3) square root of the Hessian of T in each placed joint
     motions : (3n, r) orthonormal basis of the weighted residual rows' change by rigid motions
+    fitted : the placement for which T is least, which value, gradient, blocks and motions are of
     """
 
     value: float
@@ -68,6 +78,7 @@ class FitResult:
     size: float
     blocks: np.ndarray
     motions: np.ndarray
+    fitted: Placement
 
     def __repr__(self) -> str:
         return (
@@ -90,7 +101,7 @@ class FitResult:
         """R J (3n, m) for J = dx/dq (3n, m): the Gauss-Newton Hessian of T in q is (R J)^T (R
         J)."""
         n = len(self.blocks)
-        rows = ((self.blocks @ self.placement.rotation) @ jacobian.reshape(n, 3, -1)).reshape(
+        rows = ((self.blocks @ self.fitted.rotation) @ jacobian.reshape(n, 3, -1)).reshape(
             3 * n, -1
         )
         return rows - self.motions @ (self.motions.T @ rows)
@@ -98,6 +109,31 @@ class FitResult:
 
 # joints (n, 3), closest points, T, dT/dy (n, 3)
 _Placed = tuple[np.ndarray, Closest, float, np.ndarray]
+
+
+@dataclass(frozen=True)
+class _Measure:
+    """How distances d from the surface and e from the joints' own places count: w (share e^2 +
+    (1 - share) phi(d^2)) with phi(s) = linear s + factor scale (s / scale)^power."""
+
+    share: float
+    linear: float = 1.0
+    factor: float = 0.0
+    power: float = 2.0
+    scale: float = 1.0
+
+    def felt(self, s: np.ndarray) -> np.ndarray:
+        """(n,) phi of squared distances."""
+        return self.linear * s + self.factor * self.scale * (s / self.scale) ** self.power
+
+    def slope(self, s: np.ndarray) -> np.ndarray:
+        """(n,) its derivative."""
+        return self.linear + self.factor * self.power * (s / self.scale) ** (self.power - 1)
+
+    def bend(self, s: np.ndarray) -> np.ndarray:
+        """(n,) its second derivative."""
+        factor = self.factor * self.power * (self.power - 1) / self.scale
+        return factor * (s / self.scale) ** (self.power - 2)
 
 
 class TargetFitting:
@@ -133,8 +169,10 @@ class TargetFitting:
                 field="target.positions",
                 value=self.positions.shape,
             )
-        self.size, self.share = float(target.size), float(share)
-        self._steepness = 0.0 if level is None else (level * self.size) ** -2
+        self.size = float(target.size)
+        self._measure = _Measure(float(share))
+        if level is not None:
+            self._measure = _Measure(float(share), factor=0.5, scale=(level * self.size) ** 2)
         self.weights = _normalised(weights, len(self.positions))
 
     def __call__(self, x: np.ndarray, placement: Placement | None = None) -> FitResult:
@@ -146,44 +184,78 @@ class TargetFitting:
                 f"expected {len(self.positions)} finite joints", field="joints", value=x.shape
             )
         placement = placement or best_placement(x, self.positions, self.weights)
-        found = self._evaluate(x, placement)
+        return self._result(*self._least(x, placement, self._measure))
+
+    def minimum_zone(self, x: np.ndarray, fit: FitResult | None = None) -> FitResult:
+        """The fitting of joints x (n, 3), placed so that the largest distance from the surface is
+        least: what is told of a shape, and where it is set up.
+
+        fit : theirs, as far as it is known already, however it is placed
+
+        That is where a mean of high powers of the distances is least, which is smooth: in powers
+        that grow, each from where the last one ended, 64 at last (Polya's algorithm). The distance
+        is never larger than where this began.
+        """
+        fit = self(x) if fit is None else fit
+        x = np.asarray(x, dtype=float)
+        best = placement = fit.placement
+        nearest = found = self._evaluate(x, placement, self._measure)
+        for power in _POWERS:
+            largest = float(found[1].squared_distances.max())
+            if largest <= (_ON_SURFACE * self.size) ** 2:
+                break
+            measure = _Measure(_ZONE_SHARE, 0.0, 1.0, power / 2, largest)
+            placement, found = self._least(x, placement, measure)
+            if found[1].squared_distances.max() < nearest[1].squared_distances.max():
+                best, nearest = placement, found
+        return replace(
+            fit,
+            placement=best,
+            distances=np.sqrt(nearest[1].squared_distances),
+            displacements=np.linalg.norm(nearest[0] - self.positions, axis=1),
+        )
+
+    def _least(
+        self, x: np.ndarray, placement: Placement, measure: _Measure
+    ) -> tuple[Placement, _Placed]:
+        """The placement for which a measure is least, searched from a given one."""
+        found = self._evaluate(x, placement, measure)
         for _ in range(_MAX_ITERATIONS):
-            placement, found, step = self._newton_step(x, placement, found)
+            placement, found, step = self._newton_step(x, placement, found, measure)
             if step <= _STEP_TOLERANCE:
                 break
-        return self._result(placement, found)
+        return placement, found
 
     def _newton_step(
-        self, x: np.ndarray, placement: Placement, found: _Placed
+        self, x: np.ndarray, placement: Placement, found: _Placed, measure: _Measure
     ) -> tuple[Placement, _Placed, float]:
         """One safeguarded Newton step of the placement, what is found there, and its length
         relative to the size."""
         y, closest, value, gradient = found
         centre, size, motions = self._motions(y)
         slope = motions.T @ gradient.ravel()
-        hessian = self._placement_hessian(y, centre, closest, gradient, size, motions)
+        hessian = self._placement_hessian(y, centre, closest, gradient, size, motions, measure)
         step = _descent(hessian, slope)
         fraction = 1.0
         while fraction > 1e-8:
             turn, shift = fraction * step[:3] / size, fraction * step[3:]
             trial = placement.moved(centre, turn, shift)
             bound = value * (1 + 1e-14) + 1e-4 * fraction * float(slope @ step)
-            there = self._evaluate(x, trial)
+            there = self._evaluate(x, trial, measure)
             if there[2] <= bound:
                 return trial, there, fraction * float(np.linalg.norm(step)) / size
             fraction *= 0.5
         return placement, found, 0.0
 
-    def _evaluate(self, x: np.ndarray, placement: Placement) -> _Placed:
-        """Placed joints, closest points, T and dT/dy (n, 3)."""
+    def _evaluate(self, x: np.ndarray, placement: Placement, measure: _Measure) -> _Placed:
+        """Placed joints, closest points, the measure and its derivative in y (n, 3)."""
         y = placement.apply(x)
         closest = self.surface.closest(y)
         to_position, to_surface = y - self.positions, y - closest.points
         distances = np.sum(to_surface**2, axis=1)
-        steep = self._steepness * distances
-        felt = (1 - self.share) * distances * (1 + 0.5 * steep)
-        values = self.share * np.sum(to_position**2, axis=1) + felt
-        gradient = self.share * to_position + ((1 - self.share) * (1 + steep))[:, None] * to_surface
+        share, slope = measure.share, measure.slope(distances)
+        values = share * np.sum(to_position**2, axis=1) + (1 - share) * measure.felt(distances)
+        gradient = share * to_position + ((1 - share) * slope)[:, None] * to_surface
         return y, closest, float(self.weights @ values), 2 * self.weights[:, None] * gradient
 
     def _motions(self, y: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
@@ -208,35 +280,37 @@ class TargetFitting:
         gradient: np.ndarray,
         size: float,
         motions: np.ndarray,
+        measure: _Measure,
     ) -> np.ndarray:
-        """(6, 6) second derivatives of T in the motion: Gauss-Newton, plus the curvature of
-        rotations."""
-        blocks = self._blocks(y, closest)
+        """(6, 6) second derivatives of a measure in the motion: Gauss-Newton, plus the
+        curvature of rotations."""
+        blocks = self._blocks(y, closest, measure)
         rows = np.einsum("nij,njk->nik", blocks, motions.reshape(-1, 3, 6)).reshape(-1, 6)
         hessian = rows.T @ rows
         moment = gradient.T @ (y - centre)
         hessian[:3, :3] += (0.5 * (moment + moment.T) - np.trace(moment) * np.eye(3)) / size**2
         return hessian
 
-    def _blocks(self, y: np.ndarray, closest: Closest) -> np.ndarray:
-        """(n, 3, 3) square roots of the Hessian of T in each placed joint, with the projector
-        N = I - dP/dx and the direction d to the surface:
-        2 w_i (share I + (1 - share) ((1 + r) N + 2 r d d^T)), r = (distance / (level size))^2."""
-        normal = np.eye(3) - closest.derivative
-        steep = (self._steepness * closest.squared_distances)[:, None, None]
-        across = np.sqrt(self.share + (1 - self.share) * (1 + steep))
-        root = np.sqrt(self.share) * closest.derivative + across * normal
-        if self._steepness:
+    def _blocks(self, y: np.ndarray, closest: Closest, measure: _Measure) -> np.ndarray:
+        """(n, 3, 3) square roots of a measure's Hessian in each placed joint, with the projector
+        N = I - dP/dx and the vector r from the surface:
+        2 w_i (share I + (1 - share) (phi' N + 2 phi'' r r^T))."""
+        normal, share = np.eye(3) - closest.derivative, measure.share
+        slope = measure.slope(closest.squared_distances)
+        across = np.sqrt(share + (1 - share) * slope)
+        root = np.sqrt(share) * closest.derivative + across[:, None, None] * normal
+        if measure.factor:
             offset = y - closest.points
             lengths = np.linalg.norm(offset, axis=1, keepdims=True)
             along = np.divide(offset, lengths, out=np.zeros_like(offset), where=lengths > 0)
-            more = np.sqrt(self.share + (1 - self.share) * (1 + 3 * steep)) - across
-            root = root + more * along[:, :, None] * along[:, None, :]
+            bend = 2 * measure.bend(closest.squared_distances) * closest.squared_distances
+            more = np.sqrt(share + (1 - share) * (slope + bend)) - across
+            root = root + more[:, None, None] * along[:, :, None] * along[:, None, :]
         return np.sqrt(2 * self.weights)[:, None, None] * root
 
     def _result(self, placement: Placement, found: _Placed) -> FitResult:
         y, closest, value, gradient = found
-        blocks = self._blocks(y, closest)
+        blocks = self._blocks(y, closest, self._measure)
         motions = self._motions(y)[2].reshape(-1, 3, 6)
         rows = np.einsum("nij,njk->nik", blocks, motions).reshape(-1, 6)
         basis, sizes, _ = np.linalg.svd(rows, full_matrices=False)
@@ -250,6 +324,7 @@ class TargetFitting:
             self.size,
             blocks,
             basis,
+            placement,
         )
 
 

@@ -2,6 +2,7 @@
 input."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -83,7 +84,9 @@ def test_placement_is_the_minimum():
     assert np.abs(np.cross(y, forces).sum(axis=0)).max() < 1e-14
 
     def value(motion):
-        return fitting._evaluate(x, fit.placement.moved(np.zeros(3), motion[:3], motion[3:]))[2]
+        y = fit.placement.moved(np.zeros(3), motion[:3], motion[3:]).apply(x)
+        squares = np.sum((y - TARGET.positions) ** 2, axis=1)
+        return np.mean(0.1 * squares + 0.9 * fitting.surface.closest(y).squared_distances)
 
     found = minimize(value, np.full(6, 0.02), method="BFGS", options={"gtol": 1e-9})
     assert fit.value <= found.fun + 1e-12 and found.fun == pytest.approx(fit.value, rel=1e-6)
@@ -173,6 +176,75 @@ def test_large_distances_count_with_their_fourth_power():
     assert levelled.max_percent < 0.99 * plain.max_percent
     small = TargetFitting(TARGET, level=1e6)(x)
     assert small.value == pytest.approx(plain.value, rel=1e-9)
+
+
+def heights(bend):
+    """Joints over a square of the plane, that far above it, and the plane."""
+    sides = np.linspace(-1, 1, 9)
+    flat = np.stack([*np.meshgrid(sides, sides), np.zeros((9, 9))], axis=-1).reshape(-1, 3)
+    corners = np.array([[-3, -3, 0], [3, -3, 0], [3, 3, 0], [-3, 3, 0]], dtype=float)
+    plane = Target(corners, np.array([[0, 1, 2], [0, 2, 3]]), flat, 2.0)
+    return flat + bend(flat)[:, None] * [0, 0, 1], plane
+
+
+@pytest.mark.parametrize(
+    "bend, least",
+    [
+        (lambda x: 0.1 * x[:, 0] ** 2, 0.05),  # 0 to 0.1
+        (lambda x: 0.1 * x[:, 0] * x[:, 1], 0.1),  # opposite corners
+        (lambda x: 0.01 * (np.arange(len(x)) == 40), 0.005),  # one joint sticks out
+        (lambda x: 0.02 * x[:, 0] ** 3, 0.005),  # x^3 - 3 x / 4 is Chebyshev's
+    ],
+)
+def test_the_minimum_zone_is_the_best_approximation(bend, least):
+    """Where the least largest distance is known (Chebyshev's approximation by a plane)."""
+    x, plane = heights(bend)
+    fitting = TargetFitting(plane)
+    zone = fitting.minimum_zone(motion(5).apply(x))
+    assert 0.99 * least <= zone.distances.max() <= 1.05 * least
+    assert zone.distances.max() <= (1 + 1e-9) * fitting(x).distances.max()
+
+
+def test_the_minimum_zone_against_a_general_minimiser():
+    fitting, x = TargetFitting(TARGET), motion(3).apply(joints(0.03))
+    fit = fitting(x)
+    zone = fitting.minimum_zone(x, fit)
+    assert zone.max_percent < 0.95 * fit.max_percent
+
+    def largest(motion):
+        y = zone.placement.moved(np.zeros(3), motion[:3], motion[3:]).apply(x)
+        return np.sqrt(fitting.surface.closest(y).squared_distances.max())
+
+    simplex = 0.01 * np.vstack([np.zeros(6), np.eye(6)])
+    options = {"initial_simplex": simplex, "maxiter": 4000, "xatol": 1e-7, "fatol": 1e-9}
+    found = minimize(largest, np.zeros(6), method="Nelder-Mead", options=options)
+    assert zone.distances.max() <= 1.05 * found.fun
+    np.testing.assert_allclose(zone.distances.max(), largest(np.zeros(6)), rtol=1e-12)
+
+
+def test_a_search_doesnt_see_the_minimum_zone():
+    """Value, gradient and model stay those of T, where it is least."""
+    fitting, x = TargetFitting(TARGET), motion().apply(joints())
+    fit = fitting(x)
+    zone = fitting.minimum_zone(x, fit)
+    assert zone.value == fit.value and zone.fitted is fit.placement
+    rows = np.random.default_rng(1).normal(size=(x.size, 2))
+    np.testing.assert_array_equal(zone.gradient, fit.gradient)
+    np.testing.assert_array_equal(zone.weighted_rows(rows), fit.weighted_rows(rows))
+
+
+def test_the_minimum_zone_doesnt_depend_on_where_joints_come_from():
+    fitting, x = TargetFitting(TARGET), joints(0.03)
+    here, there = (fitting.minimum_zone(m.apply(x)) for m in (motion(1), motion(2)))
+    np.testing.assert_allclose(here.distances, there.distances, atol=1e-9 * TARGET.size)
+    again = fitting.minimum_zone(x, fitting.minimum_zone(x))
+    np.testing.assert_allclose(again.distances, here.distances, atol=1e-3 * here.distances.max())
+    scaled = TargetFitting(saddle_target(unit=1e3)).minimum_zone(1e3 * x)
+    assert scaled.max_percent == pytest.approx(here.max_percent, rel=1e-9)
+    tiny = TargetFitting(saddle_target(unit=1e-6)).minimum_zone(1e-6 * x)  # nothing overflows
+    assert tiny.max_percent == pytest.approx(here.max_percent, rel=1e-9)
+    exact = fitting.surface.closest(TARGET.positions).points
+    assert TargetFitting(replace(TARGET, positions=exact)).minimum_zone(exact).max_percent < 1e-7
 
 
 def test_weights_move_the_placement():
