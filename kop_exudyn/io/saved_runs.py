@@ -223,7 +223,8 @@ def _opened(
     have it."""
     if "failed" in entry.get(REDEPLOYED, {}):
         return SimulationFailure(entry[REDEPLOYED]["failed"])
-    return _judged(objective, REDEPLOYED, states, q)
+    found = _judged(objective, REDEPLOYED, states, q)
+    return None if found is None else objective.placed(found)
 
 
 def _judged(

@@ -64,7 +64,7 @@ def level(stages: Stages, result: StageResult, numbers: Iterator[int]) -> StageR
             ends.append(last)
         steps = result.steps + last.steps
     for trial in sorted(ends, key=lambda one: worst(one.designs))[:_LOOKED_AT]:
-        found = _proved(stages, secured.weighed(trial), before)
+        found = proved(stages, secured.weighed(trial), before)
         if found is not None:
             log.info(
                 "largest deviation %.3g %%, from %.3g %%, at J = %.5g, from %.5g",
@@ -87,7 +87,7 @@ def _far(result: StageResult, felt: float) -> list[int]:
     return sorted(off, key=lambda n: -off[n])
 
 
-def _proved(stages: Stages, found: StageResult, before: StageResult) -> StageResult | None:
+def proved(stages: Stages, found: StageResult, before: StageResult) -> StageResult | None:
     """A result that is better than before and makes no other designs snap, in more sets of errors
     than steps are tried with; designs that do are made of the same parts otherwise. None where that
     doesn't help."""

@@ -269,14 +269,14 @@ class DesignObjective:
             except SimulationFailure as failure:
                 raise failure.within(f"{self.design.name}: {name} state") from None
             equilibria[name] = replace(refined, state=confirmations[name].state)
-        fitted = equilibria[self.design.fitted_role.name]
+        found = replace(evaluation, equilibria=equilibria, confirmations=confirmations)
+        return self.placed(found)
+
+    def placed(self, evaluation: Evaluation) -> Evaluation:
+        """The same evaluation, placed where its largest deviation is least."""
+        fitted = evaluation.equilibria[self.design.fitted_role.name]
         joints = fitted.state.positions[self.design.joints]
-        return replace(
-            evaluation,
-            fit=self._fitting.minimum_zone(joints, evaluation.fit),
-            equilibria=equilibria,
-            confirmations=confirmations,
-        )
+        return replace(evaluation, fit=self._fitting.minimum_zone(joints, evaluation.fit))
 
     def deviation_near(self, evaluation: Evaluation, near: Evaluation) -> float:
         """The largest deviation of a state where it is placed best, % of the size.

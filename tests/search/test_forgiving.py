@@ -8,7 +8,7 @@ import pytest
 
 from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.io.designs import load_design
-from kop_exudyn.search import forgiving
+from kop_exudyn.search import remaking
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.forgiving import forgiving_stage
 from kop_exudyn.search.objective import DesignObjective
@@ -42,7 +42,7 @@ def found(repository):
         otherwise = forgiving_stage(fixed, careless, (), count(1))
         assert stages.snapping(otherwise) == ()
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(forgiving, "_WAYS", 0)
+            patch.setattr(remaking, "_OTHERWISE", ())
             lost = forgiving_stage(fixed, careless, (), count(1))
         objective = DesignObjective(shell, dataset.weights, pool.references[0], GROSS)
     return start, careless, careful, won, told, (lost, otherwise), objective

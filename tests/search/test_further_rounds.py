@@ -206,3 +206,18 @@ def test_a_result_that_is_not_levelled_is_proved_and_levelled_again(found, monke
     monkeypatch.setattr(run, "proven", lambda stages, result: after)
     assert run._levelled(stages, start).designs is after.designs
     assert levels == [(start, 1), (start, 1), (after, 2)]
+
+
+def test_a_baseline_that_meets_all_and_is_nearer_is_taken(found, monkeypatch):
+    stages, _, start, after, _ = found
+    monkeypatch.setattr(run, "_own_level", lambda stages, result, numbers: result)
+    assert worst(after.designs) < worst(start.designs)
+    monkeypatch.setattr(Stages, "snapping_among", lambda self, result, members: ())
+    taken = run._levelled(stages, start, [after])
+    assert worst(taken.designs) == pytest.approx(worst(stages.confirmed(after).designs), rel=1e-6)
+    assert taken.kit == after.kit and taken.steps == start.steps
+    assert run._levelled(stages, after, [start]) is after
+    # one that snaps where the result doesn't, and can't be made otherwise, is no rival
+    monkeypatch.setattr(Stages, "snapping_among", lambda self, result, members: (0,))
+    monkeypatch.setattr(levelling, "made_otherwise", lambda stages, result, lost: (result, lost))
+    assert run._levelled(stages, start, [after]) is start

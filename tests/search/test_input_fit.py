@@ -52,7 +52,8 @@ def test_it_ends_at_a_minimum(design, fitted):
 
 
 def test_the_fitted_lengths_deploy_to_the_fitted_shape(design, fitted):
-    again = DesignObjective(design).redeploy(fitted.q)
+    objective = DesignObjective(design)
+    again = objective.placed(objective.redeploy(fitted.q))
     assert again.fit.max_percent == pytest.approx(fitted.fit.max_percent, rel=1e-3)
 
 

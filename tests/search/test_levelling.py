@@ -52,7 +52,7 @@ def test_the_result_is_judged_by_the_weights_asked_for(found):
         stages.dataset.designs, stages.dataset.references, after.designs
     ):
         objective = DesignObjective(shell, stages.dataset.weights, reference)
-        again = objective.judge(built.q, dict(built.equilibria))
+        again = objective.placed(objective.judge(built.q, dict(built.equilibria)))
         assert again.value == pytest.approx(built.value, rel=1e-12)
         assert again.fit.max_percent == pytest.approx(built.fit.max_percent, rel=1e-9)
 
