@@ -22,11 +22,7 @@ from ..equilibrium.newton import NewtonOptions, refine, solve
 from ..equilibrium.sensitivities import Sensitivities
 from ..errors import InputError, SimulationFailure
 from ..structures.base import Design
-<<<<<<< HEAD
-from ..structures.fitting import TargetFitting, best_placement
-=======
-from ..structures.fitting import FitResult, Placement, TargetFitting, best_placement
->>>>>>> adab041 (Deviations at the placement where the largest one is least; designs far off or snapping are made of the same parts otherwise)
+from ..structures.fitting import Placement, TargetFitting, best_placement
 from ..structures.load_bound import LoadBound
 from ..structures.opening import SAME_STATE
 from ..structures.stress_bound import NEAR, Rows, StressBound
