@@ -32,6 +32,7 @@ from .stage_results import Jump, StageResult, find_jump, restrict
 log = logging.getLogger(__name__)
 
 _MORE = 4  # times the sets of errors, where more are asked for
+_AT_A_STEP = 200  # of them, of all designs together
 _PROOF_MARGIN = (
     1.25  # how much larger than a workshop's are the errors that prove a result, at most
 )
@@ -264,17 +265,22 @@ class Stages:
 
     def careful(self) -> Stages:
         """The same stages with more sets of errors that results, and steps that are to forgive, are
-        tried with."""
-        other = copy(self)
-        other.required = replace(self.required, samples=_MORE * self.required.samples)
+        tried with; not so many more where there are many designs, as each step tries all."""
+        other, samples = copy(self), self.required.samples
+        most = max(samples, _AT_A_STEP // len(self.dataset.designs))
+        other.required = replace(self.required, samples=min(_MORE * samples, most))
         return other
 
     def proving(self) -> Stages:
         """The same stages with other and more sets of errors, to try results with: steps that keep
         to some sets come to where just these are forgiven."""
-        other = self.careful()
-        margin = min(self.required.margin, _PROOF_MARGIN)
-        other.required = replace(other.required, margin=margin, seed=self.required.seed + 1)
+        other = copy(self)
+        other.required = replace(
+            self.required,
+            samples=_MORE * self.required.samples,
+            margin=min(self.required.margin, _PROOF_MARGIN),
+            seed=self.required.seed + 1,
+        )
         return other
 
     def calmer(self, factor: float) -> Stages:
