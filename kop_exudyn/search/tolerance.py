@@ -62,6 +62,8 @@ class Sample:
     """One set of errors, and what came of it: the joints' displacements (n, 3), or why no
     equilibrium was found.
 
+    max_percent : largest deviation where it is placed best, % of the size; None where that wasn't
+        asked for or nothing was found
     snapped : into another state, from which the design doesn't come back when the errors are taken
         away
     confirmed : by Exudyn, which only some samples are given to
@@ -122,7 +124,9 @@ def forgives(objective: DesignObjective, evaluation: Evaluation) -> bool:
         usual.angle if required.angle is None else required.angle,
     ).scaled(required.margin)
     generator = np.random.default_rng([*_SEARCH, required.seed])
-    samples = _samples(objective, evaluation, tolerance, required.samples, generator, 0.0)
+    samples = _samples(
+        objective, evaluation, tolerance, required.samples, generator, 0.0, placed=False
+    )
     return not any(sample.snapped or sample.failed is not None for sample in samples)
 
 
@@ -133,8 +137,12 @@ def _samples(
     number: int,
     generator: np.random.Generator,
     confirmed: float,
+    placed: bool = True,
 ) -> Iterator[Sample]:
-    """One sample after the other, each solved when it is asked for."""
+    """One sample after the other, each solved when it is asked for.
+
+    placed : whether it is asked how far off they are
+    """
     design = objective.design
     deviations = tolerance.deviations(design)
     role = design.fitted_role.name
@@ -160,7 +168,7 @@ def _samples(
         yield Sample(
             errors,
             moved,
-            objective.deviation_near(found, evaluation),
+            objective.deviation_near(found, evaluation) if placed else None,
             snapped=bool(away and _stays_away(objective, found, evaluation)),
             confirmed=asked,
         )
