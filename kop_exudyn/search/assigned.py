@@ -11,8 +11,8 @@ from itertools import count
 import numpy as np
 
 from ..errors import SimulationFailure
+from .evaluation import DesignDerivatives, Evaluation
 from .events import ASSIGNED, SQPLabel
-from .objective import DesignDerivatives, Evaluation
 from .reassign import LocalModel, MoveParts, Reassignment, best_parts, keep_parts, reassign
 from .stage_results import SAME_STATE, StageResult, combined, distance
 from .stages import Stages

@@ -14,8 +14,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from .assigned import further_rounds
+from .evaluation import Evaluation
 from .events import SQPLabel
-from .objective import Evaluation
 from .remaking import made_better, made_otherwise
 from .stage_results import StageResult, all_same
 from .stages import Stages

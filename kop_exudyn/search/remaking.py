@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .objective import Evaluation
+from .evaluation import Evaluation
 from .reassign import LocalModel, Reassignment, improved, keep_parts
 from .shaking import shaken
 from .stage_results import StageResult, combined

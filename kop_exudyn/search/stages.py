@@ -22,12 +22,13 @@ from ..sqp.qp import QPOptions
 from ..sqp.solver import SQPOptions, SQPResult
 from .checkpoints import NoStore, Store, minimise_kept
 from .dataset import Dataset, all_or_raise
+from .evaluation import Evaluation
 from .events import ASSIGNED, Observer, SQPLabel, Stage
 from .kit_rule import rule_of
-from .objective import Evaluation, Weights
 from .problems import AssignedProblem, RelaxedProblem
 from .settings import StageSettings
 from .stage_results import Jump, StageResult, find_jump, restrict
+from .weights import Weights
 
 log = logging.getLogger(__name__)
 

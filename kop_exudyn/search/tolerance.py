@@ -21,7 +21,8 @@ from ..structures.base import Design
 from ..structures.fitting import best_placement
 from ..structures.opening import SAME_STATE
 from .buckling import snapped
-from .objective import DesignObjective, Evaluation
+from .evaluation import Evaluation
+from .objective import DesignObjective
 
 _USUAL_SHARE, _LEAST_LENGTH = 1e-3, 2e-4  # of the median length; m
 _USUAL_ANGLE = np.radians(0.1)
@@ -59,9 +60,11 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Sample:
-    """One set of errors, and what came of it: the joints' displacements (n, 3), or why no
-    equilibrium was found.
+    """One set of errors, and what came of it.
 
+    errors : (nq,) of the parameters, lengths in the design's unit and angles in rad
+    displacements : (n, 3) of the joints, in the design's unit; None where nothing was found
+    failed : why no equilibrium was found, or None
     max_percent : largest deviation where it is placed best, % of the size; None where that wasn't
         asked for or nothing was found
     snapped : into another state, from which the design doesn't come back when the errors are taken
@@ -99,6 +102,10 @@ def sample_spread(
     """Re-solved equilibria for `number` sets of normally distributed errors; the same errors for
     the same seed.
 
+    design : as it was designed
+    evaluation : of its parameters, with its states, which the samples begin from
+    tolerance : standard deviations of the errors, lengths in the design's unit and angles in rad
+    number : of samples; seed : of their errors
     confirmed : share of the samples that Exudyn has to confirm, evenly spread, the first one among
         them
     objective : the design's, where there is one already
@@ -116,6 +123,8 @@ def forgives(objective: DesignObjective, evaluation: Evaluation) -> bool:
     """Whether none of the sets of errors that the objective's requirements name makes a design
     snap. They are other sets than those that `sample_spread` draws for a verdict.
 
+    objective : of the design, with the requirements
+    evaluation : of the design's parameters, with its states
     """
     required, design = objective.requirements, objective.design
     usual = usual_tolerance(design)
