@@ -23,6 +23,7 @@ from .drawing import Drawing, Finding, size_of
 from .drawn_networks import DrawnNetwork, ReadingOptions, drawn_network
 from .frames import Frame
 from .mesh_edges import edges_of
+from .mixed_units import scale_beside, size_doubts
 from .space_nets import laid_flat, surface_through, with_heights_checked
 
 _SMALLEST, _LARGEST = 0.02, 300.0  # m: nets that are built are of a size between
@@ -143,7 +144,12 @@ def _in_plane(
     findings = drawn.findings + _doubts(drawn, rods)
     goal = None
     if options["target"] is not None:
-        goal = mesh_target(relative(options["target"], out), frame, drawn.options.scale)
+        target = options["target"]
+        ratio, said = scale_beside(target, drawn.drawing)
+        findings += said
+        # seen from the mesh, whose own units its origin is in
+        frame = replace(frame, origin=frame.origin / ratio)
+        goal = mesh_target(relative(target, out), frame, ratio * drawn.options.scale)
     own = {**options, "target": goal, "free_ends": drawn.options.free_ends}
     data = design_data(class_name, name, rods, net.content(drawn.entries, own)) | drawn.placed
     _check(drawn, data, out)
@@ -174,15 +180,18 @@ def _on_surface(
         where: dict[str, Any] = {"type": "mesh", "file": file, "up": up}
         mesh = MeshSurface(vertices, faces, "plane", up)
     else:
+        ratio, said = scale_beside(surface, drawn.drawing)
         where = {"type": "mesh", "file": relative(surface, out)}
-        where |= {"scale": scale} if scale != 1.0 else {}
+        where |= {"scale": ratio * scale} if ratio * scale != 1.0 else {}
         where |= {"chart": chart} if chart != "plane" else {}
         try:
-            mesh = load_mesh_surface(surface, chart, "z", scale, scale * drawn.origin)
+            mesh = load_mesh_surface(surface, chart, "z", ratio * scale, scale * drawn.origin)
         except InputError as error:
             if error.field != "surface.file":
                 raise
             raise InputError(error.message, source=surface) from None
+        said += size_doubts(surface, mesh.mesh.size, scale * size_of(drawn.curves))
+        drawn = replace(drawn, findings=drawn.findings + said)
         if chart == "conformal":
             drawn = replace(drawn, entries=_in_chart(drawn, mesh))
     findings = drawn.findings + _doubts(drawn, rods)

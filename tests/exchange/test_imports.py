@@ -369,3 +369,33 @@ class TestAClassFromOutside:
         out = ("--out", tmp_path / "toy.json")
         status, _, told = imported(capsys, corpus / "unit_m.dxf", "--as", "toy", *out, *SHELL)
         assert status == 2 and "aren't made of drawings (known: c_shell, grid)" in told
+
+
+class TestMixedUnits:
+    """A surface in millimetres beside a plan in metres gave a nearly flat grid, without a word."""
+
+    @pytest.mark.parametrize("option", ["--surface", "--target"])
+    def test_a_mesh_that_says_another_unit_is_converted(self, option, corpus, tmp_path, capsys):
+        said = {}
+        for unit, scale in (("m", 1.0), ("mm", 1000.0), ("in", 1 / 0.0254)):
+            mesh = dome(tmp_path / f"{unit}.obj", scale, turn=np.eye(3))
+            mesh.write_text(f"# unit: {unit}\n{mesh.read_text()}")
+            out = tmp_path / f"{unit}.json"
+            own = ("--as", "grid", *RODS) if option == "--surface" else SHELL
+            status, told, _ = imported(
+                capsys, corpus / "unit_m.dxf", "--out", out, *own, option, mesh
+            )
+            assert status == 0 and ("says that it is in" in told) == (unit != "m")
+            design = load_design(out)
+            said[unit] = (
+                design.target.vertices if option == "--surface" else design.target_mesh.vertices
+            )
+        for unit in ("mm", "in"):
+            np.testing.assert_allclose(said[unit], said["m"], rtol=1e-9, atol=1e-9)
+
+    def test_a_surface_far_larger_than_its_net_is_questioned(self, corpus, tmp_path, capsys):
+        mesh = dome(tmp_path / "mm.obj", 1000.0)  # and doesn't say so
+        out = tmp_path / "grid.json"
+        options = ("--as", "grid", *RODS, "--surface", mesh)
+        status, told, _ = imported(capsys, corpus / "unit_m.dxf", "--out", out, *options)
+        assert status == 0 and "times as large as the net: is it in the drawing's unit?" in told
