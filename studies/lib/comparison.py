@@ -104,9 +104,11 @@ def finding(rows: Sequence[Row]) -> str:
         if values[stage]
     )
     sentences = []
+    stopped = [row["design"] for row in rows if row.get("buildable") not in (None, "can be built")]
     if values["assigned"]:
+        built = f", {len(rows) - len(stopped)} of which can be built," if stopped else ""
         sentences.append(
-            f"Over {len(rows)} designs the median of the largest deviation is "
+            f"Over {len(rows)} designs{built} the median of the largest deviation is "
             f"{np.median(values['assigned']):.2g} % with the kit found here, as the designs open; "
             f"before: {medians}. The worst design ends at {max(values['assigned']):.2g} %."
         )
@@ -127,7 +129,6 @@ def finding(rows: Sequence[Row]) -> str:
             + ", ".join(f"{row['design']} ({row['input max %']:.2g} %)" for row in off)
             + "."
         )
-    stopped = [row["design"] for row in rows if row.get("buildable") not in (None, "can be built")]
     if any("buildable" in row for row in rows):
         sentences.append(
             f"Not to be built as they are: {', '.join(stopped)}."
