@@ -10,6 +10,8 @@ def row(design, assigned, built, direct=2.0):
         "direct max %": direct,
         "assigned max %": assigned,
         "buildable": "can be built" if built else "can't be built",
+        "buckled": "–",
+        "failed": "–",
     }
 
 
