@@ -17,8 +17,9 @@ from .kit_picture import png
 from .page import Card
 
 PERCENT = (
-    "Deviations are distances from the target surface at the best placement, in % of the "
-    "target's size (√3 times its mean width, about the diagonal of its bounding box)"
+    "Deviations are distances from the target surface, with each design placed where its largest "
+    "one is least, in % of the target's size (√3 times its mean width, about the diagonal of its "
+    "bounding box)"
 )
 
 

@@ -73,8 +73,9 @@ def show(
     report.figure(
         name.replace(" ", "_"),
         draw_designs(most_changed(drawn_stages(result, stages), shown)),
-        "Equilibria at their best placement on the target; grey: the input design. Joints are "
-        f"coloured by their deviation. Of {len(result.designs)} designs those that direct "
-        "projection leaves farthest off are shown.",
+        "Equilibria, placed where their largest deviation is least; grey: the input design. "
+        "Joints are coloured by their deviation. "
+        f"Of {len(result.designs)} designs those that direct projection leaves farthest off are "
+        "shown.",
         alt=alt,
     )
