@@ -33,7 +33,7 @@ from .weights import Weights
 log = logging.getLogger(__name__)
 
 _MORE = 4  # times the sets of errors, where more are asked for
-_AT_A_STEP = 200  # of them, of all designs together
+_AT_A_STEP = 100  # of them, of all designs together
 _PROOF_MARGIN = (
     1.25  # how much larger than a workshop's are the errors that prove a result, at most
 )
