@@ -32,6 +32,8 @@ from .weights import Weights
 
 log = logging.getLogger(__name__)
 
+# of the parts' sizes: where designs only open if steps are shorter than that, there is none
+_FELT = 1e-5
 _MORE = 4  # times the sets of errors, where more are asked for
 _AT_A_STEP = 100  # of them, of all designs together
 _PROOF_MARGIN = (
@@ -151,6 +153,7 @@ class Stages:
             max_steps=max_steps or self.settings.assigned_steps,
             decrease_tolerance=tolerance or self.settings.assigned_tolerance,
             penalty=self.dataset.penalty,
+            min_radius=_FELT if self.dataset.requirements.opening else SQPOptions.min_radius,
             qp=QPOptions(interior_point=len(problem.sliding) > 0),
         )
         result = minimise_kept(label, problem, point, options, self.store, self.observer)
@@ -483,8 +486,8 @@ class Stages:
 def _blocked(result: SQPResult) -> bool:
     """Whether an SQP ended where its next points could not be simulated, whatever its tolerance
     says: steps become short there."""
-    last = result.history[-1].failures if result.history else result.failures
-    return last > 0
+    tried = result.failures - sum(step.failures for step in result.history)
+    return tried > 0 or bool(result.history) and result.history[-1].failures > 0
 
 
 def _pressure(result: SQPResult) -> dict[str, dict[str, float]]:
