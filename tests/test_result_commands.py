@@ -21,6 +21,7 @@ from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.report.kit_run import optimize_and_report
 from kop_exudyn.report.viewer_scenes import kit_scene
 from kop_exudyn.search.settings import JobSettings
+from kop_exudyn.wording import beside_units
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +60,7 @@ def test_view_shows_all_stages_and_the_way_to_the_opening(run, tmp_path, capsys)
             for state in design["states"]
             if state["role"] == "deployed" and state["final"]
         ]
-        wanted = r"off target: joints at most .* %, .* · stress: max \d+ % of its limit"
+        wanted = r"off target: joints at most .*\s%, .* · stress: max \d+\s% of its limit"
         assert all(re.fullmatch(wanted, note) for note in notes)
 
 
@@ -73,7 +74,7 @@ def test_the_page_of_a_read_run_is_that_of_the_run(run):
         for d in written["designs"]
         for s in d["states"]
         if s["final"]
-    ] == [(s.stage, s.role, s.note) for d in again.designs for s in d.states]
+    ] == [(s.stage, s.role, beside_units(s.note)) for d in again.designs for s in d.states]
 
 
 def test_unusable_requests_of_view(run, tmp_path, capsys):

@@ -173,7 +173,7 @@ def test_unreadable_mesh_files_are_named(tmp_path):
     (tmp_path / "bad.ply").write_bytes(b"ply\nformat nonsense\n")
     for name, message in (
         ("none.obj", "no such file"),
-        ("bad.ply", "can't be read"),
+        ("bad.ply", "cut off"),
         ("a.txt", "no mesh file"),
     ):
         with pytest.raises(InputError, match=message):
