@@ -3,10 +3,10 @@
     python studies/pavilion.py [--quick] [--out reports/pavilion] [--jobs 2]
 
 The kits of the study of direct and relaxed kits as architecture: one design of each class, enlarged
-until a person can stand beneath it; two are lifted on four masts each, which belong to the picture
-only. Every rod is the equilibrium shape that Exudyn confirmed, swept with its true section, and has
-the colour of the part that it is cut as. Without weight, a structure that is enlarged together with
-its sections keeps its shape; what self-weight adds is not shown. The pictures are rendered by the
+until a person can stand beneath it; two are lifted on masts, which belong to the picture only.
+Every rod is the equilibrium shape that Exudyn confirmed, swept with its true section, and has the
+colour of the part that it is cut as. Without weight, a structure that is enlarged together with its
+sections keeps its shape; what self-weight adds is not shown. The pictures are rendered by the
 package itself, with depth buffers for the eye and for eighty lights of sun and sky.
 """
 

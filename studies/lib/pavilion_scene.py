@@ -24,6 +24,7 @@ _WOOD = (0.78, 0.68, 0.55)  # rods that belong to no part
 _SLENDERNESS = 250  # size over breadth of rods that have no section of their own
 # of the camera: from top to bottom of the picture, above the ground
 _ANGLE, _RISE = np.radians(26), np.radians(19)
+_ROOM = 0.96  # of the picture is filled at most
 
 
 @dataclass(frozen=True)
@@ -48,8 +49,7 @@ class Pavilion:
 def pavilion(result: KitResult, number: int, span: float, clearance: float = 0.0) -> Pavilion:
     """One assigned design of a kit, scaled so that its larger side in plan is `span` (m).
 
-    clearance : height of the lowest rod over the ground (m), on four masts that only the picture
-        has
+    clearance : height of the lowest rod over the ground (m), on masts that only the picture has
 
     Scaled with its sections, a structure without weight keeps its shape. Raises SimulationFailure
     when the stage has no such design.
@@ -112,14 +112,30 @@ def picture(
     distance = (
         max(0.90 * reach / (half * width / height), 0.62 * building.height / half) + 0.7 * reach
     )
+    seen = np.concatenate([body.vertices for body in (*building.bodies, someone)])
+    camera = Camera(target + distance * direction, target, _ANGLE)
+    while not in_view(seen, camera, width / height):
+        distance *= 1.03
+        camera = Camera(target + distance * direction, target, _ANGLE)
     return render(
         [*building.bodies, someone, ground(9 * reach)],
-        Camera(target + distance * direction, target, _ANGLE),
+        camera,
         width,
         height,
         samples=samples,
         light=light,
     )
+
+
+def in_view(points: np.ndarray, camera: Camera, aspect: float) -> bool:
+    """Whether a camera sees all points (n, 3), with a little room around them.
+
+    aspect : of the picture, width over height
+    """
+    right, up, depth = camera.axes() @ (points - camera.eye).T
+    half = np.tan(0.5 * camera.angle)
+    beside = np.abs(right) <= _ROOM * half * aspect * depth
+    return bool((beside & (np.abs(up) <= _ROOM * half * depth)).all())
 
 
 def framed(image: np.ndarray) -> Figure:
