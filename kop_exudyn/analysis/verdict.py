@@ -17,9 +17,9 @@ from ..equilibrium.stability import softest_mode
 from ..equilibrium.system import System
 from ..errors import InputError, SimulationFailure
 from ..scene.scene import Scene
-from ..search.evaluation import Evaluation
+from ..search.evaluation import Evaluation, distance
 from ..search.objective import DesignObjective
-from ..search.stage_results import SAME_STATE, distance
+from ..search.stage_results import SAME_STATE
 from ..search.tolerance import Tolerance, sample_spread, usual_tolerance
 from ..structures.base import Design
 from ..structures.loading import supports_of

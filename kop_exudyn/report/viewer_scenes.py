@@ -122,7 +122,7 @@ def opening_path(
     if not opened:
         return []
     x, y = (eq.state.positions[design.joints] for eq in (opened[-1], final))
-    placed = best_placement(x, y, np.full(len(x), 1 / len(x)))
+    placed = best_placement(x, y)
     apart = np.abs(placed.apply(x) - y).max() / design.target.size
     if apart > SAME_STATE:
         log.warning(

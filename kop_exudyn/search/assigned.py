@@ -11,10 +11,10 @@ from itertools import count
 import numpy as np
 
 from ..errors import SimulationFailure
-from .evaluation import DesignDerivatives, Evaluation
+from .evaluation import DesignDerivatives, Evaluation, distance
 from .events import ASSIGNED, SQPLabel
 from .reassign import LocalModel, MoveParts, Reassignment, best_parts, keep_parts, reassign
-from .stage_results import SAME_STATE, StageResult, combined, distance
+from .stage_results import SAME_STATE, StageResult, combined
 from .stages import Stages
 
 log = logging.getLogger(__name__)
@@ -217,10 +217,7 @@ def _kept(stages: Stages, best: StageResult, trial: StageResult) -> StageResult 
         for n, (design, a, b) in enumerate(zip(stages.dataset.designs, kept.designs, trial.designs))
         if isinstance(a, Evaluation) and isinstance(b, Evaluation)
         if (design.way is not None and not a.way)
-        or (
-            distance(design, a, b) > SAME_STATE
-            and _share(stages, kept, n) > _share(stages, best, n)
-        )
+        or (distance(design, a, b) > SAME_STATE and stages.share(kept, n) > stages.share(best, n))
     ]
     if stages.dataset.requirements.samples:
         changed = [
@@ -248,7 +245,7 @@ def _each_its_own(
         return min(trials, key=_value, default=None)
     results = [best, *trials]
     chosen = [
-        min(results, key=lambda result: _share(stages, result, n)) for n in range(len(best.designs))
+        min(results, key=lambda result: stages.share(result, n)) for n in range(len(best.designs))
     ]
     return (
         None
@@ -348,15 +345,6 @@ def _value(result: StageResult) -> float:
     return result.merit
 
 
-def _share(stages: Stages, result: StageResult, design: int) -> float:
-    """A design's share of what results are compared by."""
-    outcome = result.designs[design]
-    if not isinstance(outcome, Evaluation):
-        return np.inf
-    weight = stages.dataset.design_weights[design]
-    return weight * outcome.value + stages.dataset.penalty_of(outcome)
-
-
 def _misled(
     stages: Stages, best: StageResult, trial: StageResult, found: Reassignment
 ) -> list[int]:
@@ -366,5 +354,5 @@ def _misled(
         n
         for n, (old, new) in enumerate(zip(best.evaluations, trial.designs))
         if isinstance(new, SimulationFailure)
-        or _share(stages, trial, n) - _share(stages, best, n) > found.predicted[n] + allowed
+        or stages.share(trial, n) - stages.share(best, n) > found.predicted[n] + allowed
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..errors import SimulationFailure
 from ..structures.base import Design
 from ..structures.opening import SAME_STATE
-from .evaluation import Evaluation
+from .evaluation import Evaluation, distance
 from .objective import DesignObjective, Reference
 
 
@@ -22,7 +22,7 @@ def missed_on_return(
     SimulationFailure when no equilibrium is found on the way.
     """
     end = objective.follow(origin.q, state, steps, fitted_only=True)[-1]
-    return objective.apart(origin, end)
+    return distance(objective.design, origin, end)
 
 
 def snapped(

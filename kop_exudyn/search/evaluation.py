@@ -10,6 +10,7 @@ import numpy as np
 
 from ..equilibrium.equilibria import Equilibrium
 from ..equilibrium.exudyn_confirm import Confirmation
+from ..structures.base import Design
 from ..structures.fitting import FitResult
 from ..structures.stress_bound import Rows
 
@@ -72,3 +73,14 @@ class DesignDerivatives:
         """The Hessian, which must have been asked for."""
         assert self.hessian is not None
         return self.hessian
+
+
+def distance(design: Design, a: Evaluation, b: Evaluation) -> float:
+    """How far apart two states of a design are: the largest distance of a joint, as a share of the
+    target's size.
+
+    Each state is at the placement of its least T on the target.
+    """
+    role = design.fitted_role.name
+    joints = [e.fit.fitted.apply(e.equilibria[role].state.positions[design.joints]) for e in (a, b)]
+    return float(np.linalg.norm(joints[0] - joints[1], axis=1).max()) / a.fit.size

@@ -60,7 +60,9 @@ def level(stages: Stages, result: StageResult, numbers: Iterator[int]) -> StageR
             if better is last:
                 break
             ends.append(better)
-            last = further_rounds(careful, better, numbers, SQPLabel.of_levelling, ends, False)
+            last = further_rounds(
+                careful, better, numbers, SQPLabel.of_levelling, ends, optimised=False
+            )
             ends.append(last)
         steps = result.steps + last.steps
     for trial in sorted(ends, key=lambda one: worst(one.designs))[:_LOOKED_AT]:

@@ -26,7 +26,7 @@ from ..structures.fitting import Placement, TargetFitting, best_placement
 from ..structures.load_bound import LoadBound
 from ..structures.opening import SAME_STATE
 from ..structures.stress_bound import NEAR, Rows, StressBound
-from .evaluation import DesignDerivatives, Evaluation
+from .evaluation import DesignDerivatives, Evaluation, distance
 from .requirements import Requirements
 from .terms.base import Reference, term_class
 from .weights import Weights
@@ -131,7 +131,7 @@ class DesignObjective:
         try:
             if self._way is None:
                 found = self.judge(q, design.deploy(q))
-                same = self.apart(found, evaluation) <= SAME_STATE
+                same = distance(design, found, evaluation) <= SAME_STATE
                 return evaluation if same else found
             *way, deployed = self._way.opened(
                 design.systems, q, design.assembled(q, evaluation.equilibria)
@@ -193,16 +193,6 @@ class DesignObjective:
             iterations=evaluation.iterations + sum(state.iterations for state in way),
             solves=evaluation.solves + len(way),
         )
-
-    def apart(self, a: Evaluation, b: Evaluation) -> float:
-        """The largest distance of a joint in two states, each placed where its T is least, as a
-        share of the size."""
-        role = self.design.fitted_role.name
-        x, y = (
-            e.fit.fitted.apply(e.equilibria[role].state.positions[self.design.joints])
-            for e in (a, b)
-        )
-        return float(np.linalg.norm(x - y, axis=1).max()) / a.fit.size
 
     def derivatives(self, evaluation: Evaluation, hessian: bool = True) -> DesignDerivatives:
         """Differentiate F at the evaluation's states, converged to round-off; Exudyn's, where it
@@ -281,7 +271,7 @@ class DesignObjective:
         """
         role, joints = self.design.fitted_role.name, self.design.joints
         x, y = (e.equilibria[role].state.positions[joints] for e in (evaluation, near))
-        onto = best_placement(x, y, np.full(len(x), 1 / len(x)))
+        onto = best_placement(x, y)
         place = near.fit.placement
         start = Placement(place.rotation @ onto.rotation, place.apply(onto.translation[None])[0])
         return self._fitting.minimum_zone(x, replace(evaluation.fit, placement=start)).max_percent
@@ -332,7 +322,7 @@ class DesignObjective:
         near = previous.equilibria[role]
         there = Sensitivities(design.systems[role], near).predict(q - near.q)
         x, y = (start.state.positions[design.joints] for start in (there, near))
-        placed = best_placement(x, y, np.full(len(x), 1 / len(x))).apply(x)
+        placed = best_placement(x, y).apply(x)
         return float(np.linalg.norm(placed - y, axis=1).max()) / previous.fit.size
 
     def _solve(

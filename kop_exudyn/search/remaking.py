@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .evaluation import Evaluation
+from .evaluation import DesignDerivatives, Evaluation
 from .reassign import LocalModel, Reassignment, improved, keep_parts
 from .shaking import shaken
 from .stage_results import StageResult, combined
@@ -46,8 +46,9 @@ def made_otherwise(
     still = tuple(lost)
     if not _free_to_choose(stages):
         return result, still
+    derivatives = _Derivatives(stages)
     for n in lost:
-        found = _forgiving(stages, result, n, dear)
+        found = _forgiving(stages, result, n, derivatives, dear)
         if found is not None:
             log.info(
                 "%s made of other parts forgives: J = %.5g, from %.5g",
@@ -60,19 +61,20 @@ def made_otherwise(
     return result, still
 
 
-def _forgiving(stages: Stages, result: StageResult, n: int, dear: bool) -> StageResult | None:
+def _forgiving(
+    stages: Stages, result: StageResult, n: int, derivatives: _Derivatives, dear: bool
+) -> StageResult | None:
     """The result with a design made otherwise that forgives; None where none is found."""
     rng = np.random.default_rng([stages.settings.seed, n])
-    values = [_value(stages, result, k) for k in range(len(result.designs))]
-    limit = NEAR * result.merit - (result.merit - values[n])
-    usual = values[n] + (NEAR - 1) * max(values[n], float(np.mean(values)))
+    values = [stages.share(result, k) for k in range(len(result.designs))]
+    most = values[n] + (NEAR - 1) * result.merit
+    usual = min(most, values[n] + (NEAR - 1) * max(values[n], float(np.mean(values))))
     last: StageResult | None = None
     for tries in _OTHERWISE:
-        for opened in _opened(stages, result, n, _ways(stages, result, n, rng, tries)):
-            value = _value(stages, opened, n)
-            if value > min(limit, usual) and (not dear or last is not None or value > limit):
-                continue
-            if n in stages.snapping_among(opened, [n]):
+        for opened in _opened(stages, result, n, _ways(stages, result, n, derivatives, rng, tries)):
+            value = stages.share(opened, n)
+            allowed = most if dear and last is None else usual
+            if value > allowed or n in stages.snapping_among(opened, [n]):
                 continue
             if value <= usual:
                 return opened
@@ -90,13 +92,14 @@ def made_better(stages: Stages, result: StageResult, far: Sequence[int], seed: i
     """
     if not _free_to_choose(stages):
         return result
+    derivatives = _Derivatives(stages)
     for n in far:
         rng = np.random.default_rng([stages.settings.seed, seed, n])
-        before = _value(stages, result, n)
+        before = stages.share(result, n)
         limit = (1 - _LEAST) * before
-        ways = _ways(stages, result, n, rng, _BETTER)
+        ways = _ways(stages, result, n, derivatives, rng, _BETTER)
         for opened in _opened(stages, result, n, ways, _OPENED, limit):
-            value = _value(stages, opened, n)
+            value = stages.share(opened, n)
             if value <= limit and n not in stages.snapping_among(opened, [n]):
                 log.info(
                     "%s made of other parts: %.5g, from %.5g",
@@ -109,6 +112,27 @@ def made_better(stages: Stages, result: StageResult, far: Sequence[int], seed: i
     return result
 
 
+class _Derivatives:
+    """Of the designs of results that follow each other: found once for as long as a design stays as
+    it is."""
+
+    def __init__(self, stages: Stages):
+        self._stages = stages
+        self._known: dict[int, tuple[Evaluation, DesignDerivatives]] = {}
+
+    def of(self, result: StageResult) -> list[DesignDerivatives]:
+        """With the Hessians, of all designs."""
+        new = {
+            n: evaluation
+            for n, evaluation in enumerate(result.evaluations)
+            if n not in self._known or self._known[n][0] is not evaluation
+        }
+        changed = self._stages.dataset.subset(list(new))
+        found = changed.derivatives(list(new.values()), hessian=True)
+        self._known |= {n: (new[n], derivatives) for n, derivatives in zip(new, found)}
+        return [self._known[n][1] for n in range(len(result.designs))]
+
+
 def _free_to_choose(stages: Stages) -> bool:
     """Whether elements may take any part of the kit."""
     return stages.rule.stock is None and not len(stages.dataset.sliding)
@@ -118,6 +142,7 @@ def _ways(
     stages: Stages,
     result: StageResult,
     n: int,
+    derivatives: _Derivatives,
     rng: np.random.Generator,
     tries: Sequence[tuple[float, float]],
 ) -> list[Reassignment]:
@@ -127,20 +152,18 @@ def _ways(
     """
     dataset = stages.dataset
     members = range(len(result.designs))
-    derivatives = dataset.derivatives(result.evaluations, hessian=True)
     scales = dataset.split(dataset.scales())
     own = [g for g, design in enumerate(dataset.group_designs) if design == n]
     others = [k for k in members if k != n]
     problem = stages.assigned_problem(result, members)
     found: list[Reassignment] = []
     models = {
-        damping: LocalModel.of(derivatives, dataset.design_weights, scales, damping)
+        damping: LocalModel.of(derivatives.of(result), dataset.design_weights, scales, damping)
         for damping in {damping for _, damping in tries}
     }
     for share, damping in tries:
-        model = models[damping]
         start = shaken(result.assignment, result.kit, rng, own, share)
-        way = improved(problem.reassigned(start), model, others, keep_parts)
+        way = improved(problem.reassigned(start), models[damping], others, keep_parts)
         if way is None or not way.assignment.changes(result.assignment):
             continue
         if all(way.assignment.changes(other.assignment) for other in found):
@@ -167,20 +190,11 @@ def _opened(
         trial = stages.built_from(
             way.kit, way.assignment, result.evaluations, way.free, steps, watched=False
         )
-        if isinstance(trial.designs[n], Evaluation) and _value(stages, trial, n) <= limit:
+        if isinstance(trial.designs[n], Evaluation) and stages.share(trial, n) <= limit:
             led.append(trial)
-    led.sort(key=lambda trial: _value(stages, trial, n))
+    led.sort(key=lambda trial: stages.share(trial, n))
     for trial in led[:most]:
         chosen = [trial if k == n else result for k in range(len(result.designs))]
         opened = stages.secured().kept(stages.judged(combined(chosen, stages.dataset)))
         if opened.value is not None:
             yield opened
-
-
-def _value(stages: Stages, result: StageResult, n: int) -> float:
-    """A design's share of what results are compared by; infinite where it failed."""
-    outcome = result.designs[n]
-    if not isinstance(outcome, Evaluation):
-        return np.inf
-    weight = stages.dataset.design_weights[n]
-    return weight * outcome.value + stages.dataset.penalty_of(outcome)

@@ -19,10 +19,10 @@ from ..structures.fitting import TargetFitting
 from ..structures.stacking import group_designs
 from ..structures.strength import strength_summary
 from ..units import Units, common_units
-from .evaluation import Evaluation
+from .evaluation import Evaluation, distance
 from .events import Stage, StageEvent, events_to_list
 from .objective import Reference
-from .stage_results import SAME_STATE, StageResult, distance
+from .stage_results import SAME_STATE, StageResult
 from .starts import TriedStart
 
 INPUT = "input"  # the designs as given, before all stages

@@ -189,18 +189,19 @@ def _levelled(
     is nearest may be as good as what is searched for."""
     numbers = count(1)
     found = _own_level(stages, result, numbers)
-    for rival in rivals:
-        if rival.value is None or found.value is None:
-            continue
-        sure = stages.confirmed(found)  # and placed best
+    whole = [rival for rival in rivals if rival.value is not None]
+    if found.value is None or not whole:
+        return found
+    sure, secured = stages.confirmed(found), stages.secured()  # and placed best
+    for rival in whole:
         if worst(stages.confirmed(rival).designs) >= worst(sure.designs):
             continue
-        secured = stages.secured()
         other = proved(stages, secured.confirmed(secured.kept(secured.weighed(rival))), sure)
         if other is not None:
             log.info("a baseline is nearer to the target: %.3g %%", worst(other.designs))
             other = replace(other, steps=found.steps, jumps=found.jumps)
             found = _own_level(stages, other, numbers)
+            sure = stages.confirmed(found)
     return found
 
 

@@ -14,7 +14,7 @@ from ..kit.parts import Assignment, Kit
 from ..structures.base import Design
 from ..structures.opening import SAME_STATE  # noqa: F401
 from .dataset import Dataset
-from .evaluation import Evaluation
+from .evaluation import Evaluation, distance
 
 # A joint that moves this much further in one step of the path than in the steps around it has
 # snapped.
@@ -93,17 +93,6 @@ def find_jump(
     if moves[worst] > _JUMP_SHARE and moves[worst] > _JUMP_FACTOR * np.median(moves):
         return Jump(design.name, (worst + 1) / len(path), float(moves[worst]))
     return None
-
-
-def distance(design: Design, a: Evaluation, b: Evaluation) -> float:
-    """How far apart two states of a design are: the largest distance of a joint, as a share of the
-    bounding box.
-
-    Each state is at the placement of its least T on the target.
-    """
-    role = design.fitted_role.name
-    joints = [e.fit.fitted.apply(e.equilibria[role].state.positions[design.joints]) for e in (a, b)]
-    return float(np.linalg.norm(joints[0] - joints[1], axis=1).max()) / a.fit.size
 
 
 def all_same(designs: Sequence[Design], led: StageResult, opened: StageResult) -> bool:

@@ -1,5 +1,5 @@
-"""The stages of finding a kit: direct, unrelaxed, relaxed, the watched path to the parts, and
-assigned."""
+"""The stages of finding a kit: direct, unrelaxed, relaxed and assigned, and what they demand of
+designs."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from ..kit.projection import Projection
 from ..kit.reuse import PieceCount
 from ..kit.stock import Stock
 from ..sqp.constraints import check_feasible
+from ..sqp.options import SQPOptions, SQPResult
 from ..sqp.qp import QPOptions
-from ..sqp.solver import SQPOptions, SQPResult
 from .checkpoints import NoStore, Store, minimise_kept
 from .dataset import Dataset, all_or_raise
 from .evaluation import Evaluation
@@ -33,7 +33,7 @@ from .weights import Weights
 log = logging.getLogger(__name__)
 
 # of the parts' sizes: where designs only open if steps are shorter than that, there is none
-_FELT = 1e-5
+_SHORTEST = 1e-5
 _MORE = 4  # times the sets of errors, where more are asked for
 _AT_A_STEP = 100  # of them, of all designs together
 _PROOF_MARGIN = (
@@ -153,7 +153,7 @@ class Stages:
             max_steps=max_steps or self.settings.assigned_steps,
             decrease_tolerance=tolerance or self.settings.assigned_tolerance,
             penalty=self.dataset.penalty,
-            min_radius=_FELT if self.dataset.requirements.opening else SQPOptions.min_radius,
+            min_radius=_SHORTEST if self.dataset.requirements.opening else SQPOptions.min_radius,
             qp=QPOptions(interior_point=len(problem.sliding) > 0),
         )
         result = minimise_kept(label, problem, point, options, self.store, self.observer)
@@ -457,6 +457,14 @@ class Stages:
             penalty=penalty,
             reuse_factor=self._reuse_factor(kit, assignment),
         )
+
+    def share(self, result: StageResult, n: int) -> float:
+        """Design n's share of what results are compared by; infinite where it failed."""
+        outcome = result.designs[n]
+        if not isinstance(outcome, Evaluation):
+            return np.inf
+        dataset = self.dataset
+        return dataset.design_weights[n] * outcome.value + dataset.penalty_of(outcome)
 
     def piece_cost(self, result: StageResult) -> float:
         """By how much J may rise for a piece less, see `StageSettings.reuse`."""

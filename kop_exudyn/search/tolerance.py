@@ -168,10 +168,7 @@ def _samples(
             yield Sample(errors, None, None, str(failure))
             continue
         joints = found.equilibria[role].state.positions[design.joints]
-        moved = (
-            best_placement(joints, wanted, np.full(len(joints), 1 / len(joints))).apply(joints)
-            - wanted
-        )
+        moved = best_placement(joints, wanted).apply(joints) - wanted
         missed = np.linalg.norm(moved - (J @ errors).reshape(-1, 3), axis=1).max()
         away = missed > SAME_STATE * evaluation.fit.size
         yield Sample(

@@ -204,7 +204,7 @@ class TargetFitting:
             largest = float(found[1].squared_distances.max())
             if largest <= (_ON_SURFACE * self.size) ** 2:
                 break
-            measure = _Measure(_ZONE_SHARE, 0.0, 1.0, power / 2, largest)
+            measure = _Measure(_ZONE_SHARE, linear=0.0, factor=1.0, power=power / 2, scale=largest)
             placement, found = self._least(x, placement, measure)
             if found[1].squared_distances.max() < nearest[1].squared_distances.max():
                 best, nearest = placement, found
@@ -328,9 +328,13 @@ class TargetFitting:
         )
 
 
-def best_placement(x: np.ndarray, positions: np.ndarray, weights: np.ndarray) -> Placement:
+def best_placement(
+    x: np.ndarray, positions: np.ndarray, weights: np.ndarray | None = None
+) -> Placement:
     """Rigid motion of least sum w |R x + t - positions|^2 (Kabsch, Acta Cryst. A32, 1976); weights
-    sum to one."""
+    sum to one, and are equal by default."""
+    if weights is None:
+        weights = np.full(len(x), 1 / len(x))
     centre, goal = weights @ x, weights @ positions
     left, _, right = np.linalg.svd(((x - centre) * weights[:, None]).T @ (positions - goal))
     turn = np.diag([1, 1, np.sign(np.linalg.det(left @ right))])

@@ -85,5 +85,5 @@ def stiffened_plates(file: Path, factors: Sequence[float]) -> dict[str, Any]:
 
 def _percent_apart(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Distances (n,) after a rigid alignment, % of the bounding-box diagonal of y."""
-    placed = best_placement(x, y, np.full(len(x), 1 / len(x))).apply(x)
+    placed = best_placement(x, y).apply(x)
     return 100 * np.linalg.norm(placed - y, axis=1) / np.linalg.norm(np.ptp(y, axis=0))

@@ -10,6 +10,7 @@ from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.search import remaking
 from kop_exudyn.search.dataset import Dataset
+from kop_exudyn.search.evaluation import distance
 from kop_exudyn.search.forgiving import forgiving_stage
 from kop_exudyn.search.objective import DesignObjective
 from kop_exudyn.search.pool import DesignPool
@@ -73,7 +74,7 @@ def test_the_next_best_is_found_where_the_best_snaps(found):
     assert told[3] == () and won.snapping == ()
     assert won.merit <= careful.merit
     opened = objective.redeploy(won.designs[0].q)
-    assert objective.apart(opened, won.designs[0]) < 1e-3
+    assert distance(objective.design, opened, won.designs[0]) < 1e-3
 
 
 def test_where_nothing_helps_the_best_is_kept_and_says_so(found):

@@ -11,6 +11,7 @@ from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.search import assigned, forgiving, levelling, run
 from kop_exudyn.search.assigned import further_rounds
 from kop_exudyn.search.dataset import Dataset
+from kop_exudyn.search.evaluation import distance
 from kop_exudyn.search.levelling import level, worst
 from kop_exudyn.search.objective import DesignObjective
 from kop_exudyn.search.reassign import keep_parts
@@ -61,7 +62,7 @@ def test_what_is_required_stays_met_on_the_way(found):
     ):
         assert built.way
         objective = DesignObjective(shell, stages.dataset.weights, reference, stages.required)
-        assert objective.apart(objective.redeploy(built.q), built) < 1e-3
+        assert distance(objective.design, objective.redeploy(built.q), built) < 1e-3
 
 
 def test_a_design_that_is_lost_stays_as_it_was(found, monkeypatch):

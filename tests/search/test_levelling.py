@@ -10,6 +10,7 @@ from support.shells import stages_of_two
 
 from kop_exudyn.errors import InputError
 from kop_exudyn.search import levelling
+from kop_exudyn.search.evaluation import distance
 from kop_exudyn.search.events import SQPLabel
 from kop_exudyn.search.levelling import level, worst
 from kop_exudyn.search.objective import DesignObjective
@@ -66,7 +67,7 @@ def test_what_is_required_stays_met(found):
         stages.dataset.designs, stages.dataset.references, after.designs
     ):
         objective = DesignObjective(shell, stages.dataset.weights, reference, stages.required)
-        assert objective.apart(objective.redeploy(built.q), built) < 1e-3
+        assert distance(objective.design, objective.redeploy(built.q), built) < 1e-3
 
 
 def test_where_nothing_may_or_can_move_the_result_stays(found):

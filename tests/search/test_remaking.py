@@ -66,12 +66,12 @@ def test_a_dear_way_is_only_taken_where_that_is_allowed(found, monkeypatch):
     stages, start, _ = found
     monkeypatch.setattr(remaking, "_OTHERWISE", (remaking._OTHERWISE[0][:3],))
     monkeypatch.setattr(Stages, "snapping_among", lambda self, result, members: ())
-    value = remaking._value
+    share = Stages.share
 
-    def dearer(stages, result, n):
-        return value(stages, start, n) if result is start else 1.9 * value(stages, start, n)
+    def dearer(self, result, n):
+        return share(self, start, n) if result is start else 1.9 * share(self, start, n)
 
-    monkeypatch.setattr(remaking, "_value", dearer)
+    monkeypatch.setattr(Stages, "share", dearer)
     assert made_otherwise(stages, start, [0]) == (start, (0,))
     alone = replace(start, value=10 * start.value)  # of many designs
     result, still = made_otherwise(stages, alone, [0], dear=True)

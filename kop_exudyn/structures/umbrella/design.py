@@ -318,8 +318,7 @@ def _laid_on(target: UmbrellaTarget, positions: np.ndarray) -> np.ndarray:
     known = np.isfinite(target.crossings).all(axis=1)
     if not hold_in_place(target.crossings[known]):
         return positions
-    n = int(np.count_nonzero(known))
-    placement = best_placement(positions[known], target.crossings[known], np.full(n, 1 / n))
+    placement = best_placement(positions[known], target.crossings[known])
     return placement.apply(positions)
 
 

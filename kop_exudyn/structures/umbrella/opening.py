@@ -145,7 +145,7 @@ class Opening:
             return compact
         x = np.concatenate([term.queries(compact) for term in self._attraction])
         places = np.concatenate([term.targets for term in self._attraction])
-        placed = best_placement(x, places, np.full(len(x), 1 / len(x)))
+        placed = best_placement(x, places)
         return compact.transformed(placed.rotation, placed.translation)
 
     def _reached(
@@ -180,7 +180,7 @@ class Opening:
     def _placed_like(self, other: State, state: State) -> State:
         joints = self._design.joints
         x, y = (each.positions[joints] for each in (state, other))
-        placed = best_placement(x, y, np.full(len(x), 1 / len(x)))
+        placed = best_placement(x, y)
         return state.transformed(placed.rotation, placed.translation)
 
 

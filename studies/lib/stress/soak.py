@@ -123,7 +123,7 @@ def _apart(first: Found, second: Found, place: Place) -> float:
     """How far the joints in both places are apart, of the size."""
     x, y = (joints - joints.mean(axis=0) for joints in (first.joints, second.joints / place.unit))
     if first.design.class_name == "umbrella":  # laid where its anchor says, by the axes
-        x = best_placement(x, y, _equal(x)).apply(x)
+        x = best_placement(x, y).apply(x)
     else:
         x = x @ place.rotation.T
     if first.design.class_name == "grid":  # whose families change places with the axes
@@ -151,10 +151,6 @@ def _differences(
     return found
 
 
-def _equal(x: np.ndarray) -> np.ndarray:
-    return np.full(len(x), 1 / len(x))
-
-
 def _found_again(rng: np.random.Generator, found: Found) -> Sequence[str]:
     """Solved anew from a state beside the equilibrium."""
     design, role, eq = found.design, found.design.fitted_role, found.equilibrium
@@ -170,7 +166,7 @@ def _found_again(rng: np.random.Generator, found: Found) -> Sequence[str]:
     except SimulationFailure as failure:
         return [f"not found again from beside it: {failure}"]
     x, y = (e.state.positions[design.joints] for e in (eq, again))
-    apart = np.abs(best_placement(y, x, _equal(x)).apply(y) - x).max() / design.target.size
+    apart = np.abs(best_placement(y, x).apply(y) - x).max() / design.target.size
     return [f"found again {apart:.1e} of the size away"] if apart > BACK else []
 
 
