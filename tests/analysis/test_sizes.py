@@ -2,10 +2,11 @@
 
 import copy
 import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.settings import FEW_ERRORS
+from support.settings import QUICK
 from support.zigzags import zigzags
 
 from kop_exudyn.analysis.sizes import KitCost, deviation, smallest_kit, trade_off, unmet
@@ -15,17 +16,15 @@ from kop_exudyn.search.neighbours import resized
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.run import optimize_kit
-from kop_exudyn.search.settings import JobSettings, StageSettings
+from kop_exudyn.search.settings import JobSettings
 from kop_exudyn.search.stages import Stages
 from kop_exudyn.search.weights import Weights
 
-STAGES = StageSettings(
+STAGES = replace(
+    QUICK,
     schedule=(1e3, 1e5),
     path_steps=4,
     leaps=0,
-    effort="quick",
-    levelling=0,
-    requirements=FEW_ERRORS,
 )
 SETTINGS = JobSettings(jobs=1, stages=STAGES, baselines=False)
 

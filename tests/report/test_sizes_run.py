@@ -2,10 +2,11 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.settings import FEW_ERRORS
+from support.settings import QUICK
 from support.zigzags import zigzags
 
 from kop_exudyn.errors import InputError
@@ -16,16 +17,14 @@ from kop_exudyn.io.kits import load_kit
 from kop_exudyn.io.results import load_result
 from kop_exudyn.report import sizes_run
 from kop_exudyn.report.sizes_run import smallest_and_report, tradeoff_and_report
-from kop_exudyn.search.settings import JobSettings, StageSettings
+from kop_exudyn.search.settings import JobSettings
 
-STAGES = StageSettings(
+STAGES = replace(
+    QUICK,
     schedule=(1e3, 1e5),
     path_steps=4,
     leaps=0,
     reassignments=1,
-    effort="quick",
-    levelling=0,
-    requirements=FEW_ERRORS,
 )
 SETTINGS = JobSettings(jobs=1, stages=STAGES, baselines=False)
 SIZES = [{"linear": n, "angular": 2} for n in (2, 4)]

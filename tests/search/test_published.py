@@ -1,23 +1,23 @@
 """The published method as a baseline in one run with ours."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from support.settings import FEW_ERRORS
+from support.settings import QUICK
 from support.zigzags import zigzags
 
 from kop_exudyn.io.results import load_result
 from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.report.kit_run import optimize_and_report
-from kop_exudyn.search.settings import JobSettings, StageSettings
+from kop_exudyn.search.settings import JobSettings
 
-STAGES = StageSettings(
+STAGES = replace(
+    QUICK,
     schedule=(1e3, 1e5),
     path_steps=4,
     leaps=0,
     redeployments=0,
-    levelling=0,
-    effort="quick",
-    requirements=FEW_ERRORS,
 )
 SETTINGS = JobSettings(jobs=1, stages=STAGES, baselines=False, published=True)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.settings import FEW_ERRORS
+from support.settings import QUICK
 
 from kop_exudyn.kit.kinds import part_kind
 from kop_exudyn.kit.reuse import PieceCount
@@ -249,7 +249,8 @@ def test_constraints_on_elements_hold_in_both_stages(stages):
 
     constraints = on_elements(designs, statement)
     assert constraints.rows == 2
-    settings = StageSettings(
+    settings = replace(
+        QUICK,
         schedule=(1e3,),
         relaxed_steps=5,
         assigned_steps=5,
@@ -257,9 +258,6 @@ def test_constraints_on_elements_hold_in_both_stages(stages):
         reassignments=1,
         leaps=0,
         redeployments=0,
-        effort="quick",
-        levelling=0,
-        requirements=FEW_ERRORS,
         constraints=constraints,
     )
     outcome, free = (

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.grids import coarse_grid
-from support.settings import FEW_ERRORS, FEW_STEPS
+from support.settings import FEW_STEPS, QUICK
 
 from kop_exudyn.equilibrium.newton import NewtonOptions
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.search.objective import DesignObjective
 from kop_exudyn.search.run import optimize_kit
-from kop_exudyn.search.settings import JobSettings, StageSettings
+from kop_exudyn.search.settings import JobSettings
 from kop_exudyn.search.terms import base
 from kop_exudyn.search.weights import Weights
 from kop_exudyn.structures.base import design_from_dict
@@ -154,15 +154,13 @@ def test_a_term_is_one_class(repository, monkeypatch, jobs):
         Weights.of({"material": 20.0}),
         jobs=jobs,
         baselines=False,
-        stages=StageSettings(
+        stages=replace(
+            QUICK,
             schedule=(1e3,),
             reassignments=0,
             relaxed_steps=3,
             assigned_steps=3,
             redeployments=0,
-            effort="quick",
-            levelling=0,
-            requirements=FEW_ERRORS,
         ),
     )
     outcome = optimize_kit(designs, {"linear": 2, "angular": 2}, settings=settings)

@@ -7,10 +7,11 @@ import os
 import signal
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.settings import FEW_ERRORS
+from support.settings import FEW_ERRORS, QUICK
 
 from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.kit.parts import Kit
@@ -181,14 +182,12 @@ class TestWorkers:
         designs = arches(3)
         settings = JobSettings(
             jobs=2,
-            stages=StageSettings(
+            stages=replace(
+                QUICK,
                 schedule=(1e3,),
                 relaxed_steps=2,
                 assigned_steps=2,
                 path_steps=3,
-                effort="quick",
-                levelling=0,
-                requirements=FEW_ERRORS,
             ),
         )
         undisturbed = fingerprint(optimize_kit(designs, {"linear": 2}, settings=settings))
