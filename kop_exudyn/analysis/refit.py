@@ -16,10 +16,10 @@ from ..errors import SimulationFailure
 from ..search.input_fit import OwnProblem
 from ..search.objective import DesignObjective
 from ..search.weights import Weights
+from ..sqp.history import StepRecord
 from ..sqp.options import SQPOptions
-from ..sqp.solver import StepRecord, minimise
+from ..sqp.solver import minimise
 from ..structures.base import design_from_dict
-from ..structures.deviation import Deviation, deviation
 from .simulation import SimulationResult, simulate
 
 # Of the joints' own places in the fit, whose share in the search for a kit is ten times as much:
@@ -85,16 +85,11 @@ def refit(
         return Refit(dict(data), before, before, found.steps, str(failure))
     if mean_square(after) < mean_square(before):
         return Refit(new, before, after, found.steps)
-    fits = 100 * found.point.data.fit.distances.max() / found.point.data.fit.size
     elsewhere = ""
-    if fits < before.fit.max_percent < after.fit.max_percent:
+    fitted = problem.objective.placed(found.point.data)
+    if fitted.fit.max_percent < before.fit.max_percent < after.fit.max_percent:
         elsewhere = f"opens into another state, {after.fit.max_percent:.3g} % off"
     return Refit(dict(data), before, before, found.steps, elsewhere)
-
-
-def deviation_of(result: SimulationResult) -> Deviation:
-    """How far a simulated design is off its target, joints and what is between them."""
-    return deviation(result.design, result.design.target, result.fit, result.deployed.state)
 
 
 def mean_square(result: SimulationResult) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -103,6 +104,12 @@ class SimulationResult:
         """
         return 100 * float(self.fit.displacements.max()) / self.fit.size
 
+    @property
+    def deviation(self) -> Mapping[str, float]:
+        """How far the joints, and the pieces between them, are off the target: the field "fit" of
+        results, see `Deviation.to_dict`."""
+        return fit_summary(self.design, self.design.target, self.fit, self.deployed.state)
+
     def to_dict(self) -> dict[str, Any]:
         """As `kop simulate --json` prints it.
 
@@ -129,7 +136,7 @@ class SimulationResult:
                 (role.opening for role in self.design.roles if not role.fitted), None
             ),
             "exudyn": self.confirmations[self.design.fitted_role.name].to_dict(),
-            "fit": fit_summary(self.design, self.design.target, self.fit, final.state),
+            "fit": self.deviation,
             "displaced_percent": self.displaced_percent,
             "escapes": final.escapes,
             **self._limits(),

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .output import add_json, report
+from .output import add_json, deviation_text, report
 from .values import positive
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
         found = refit(data, str(args.design), max_steps=args.max_steps, observer=observe)
     content = relocated(found.data, args.design.parent, args.out.parent)
     path = write_json(args.out, content, overwrite=args.overwrite)
-    told = {"before": _fit(found.before), "after": _fit(found.after)}
+    told = {"before": found.before.deviation, "after": found.after.deviation}
     after = _words(found.after) if found.changed else _unchanged(found.elsewhere)
     text = f"{path}\nbefore     {_words(found.before)}\nafter      {after}\n"
     told_all = {
@@ -77,21 +77,12 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _fit(result: SimulationResult) -> dict[str, float]:
-    from ..analysis.refit import deviation_of
-
-    return deviation_of(result).to_dict()
-
-
 def _words(result: SimulationResult) -> str:
     """How far the joints, and what is between them, are off."""
     from ..units import with_unit
 
-    fit, units = _fit(result), result.design.units
-    text = (
-        f"max {fit['max_percent']:.3g} %, mean {fit['mean_percent']:.3g} % of the target's size; "
-        f"max {with_unit(fit['max'], 'length', units, 3)}"
-    )
+    fit, units = result.deviation, result.design.units
+    text = deviation_text(fit, units)
     if fit["pieces_max"] != fit["max"]:
         between = with_unit(fit["pieces_max"], "length", units, 3)
         text += f"; between joints max {fit['pieces_max_percent']:.3g} %, {between}"

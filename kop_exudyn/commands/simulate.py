@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..wording import counted
-from .output import add_json
+from .output import add_json, deviation_text
 from .values import gravity
 
 if TYPE_CHECKING:
@@ -138,8 +138,7 @@ def _summary(result: dict, units: Units | None) -> str:
         "design": result["design"],
         "model": f"{counted(result['elements'], 'element')}, "
         f"{counted(result['unknowns'], 'unknown')}",
-        "deviation": f"max {fit['max_percent']:.3g} %, mean {fit['mean_percent']:.3g} % "
-        f"of the target's size; max {with_unit(fit['max'], 'length', units, 3)}"
+        "deviation": deviation_text(fit, units)
         + (" (kop fit may lower it)" if fit["max_percent"] > OFF_TARGET else ""),
         "displacement": f"max {result['displaced_percent']:.3g} % from the joints' own places",
         "elastic energy": with_unit(result["elastic_energy"], "energy", units, 6),

@@ -46,6 +46,24 @@ class Imported:
     meshes: dict[Path, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class _Order:
+    """What is made of a net: a design of a class, named, of such rods, for a file at `out`, by
+    options as of `import_net`."""
+
+    class_name: str
+    net: NetClass
+    name: str
+    rods: Rods
+    out: Path
+    options: Mapping[str, Any]
+
+    def data(self, drawn: DrawnNetwork, own: Mapping[str, Any]) -> dict[str, Any]:
+        """The content of the file, of the net and the class's own options."""
+        content = self.net.content(drawn.entries, {**self.options, **own})
+        return design_data(self.class_name, self.name, self.rods, content) | drawn.placed
+
+
 def scaled_reading(
     drawing: Drawing, options: ReadingOptions, scale: float | None, units: Units | None
 ) -> tuple[ReadingOptions, Units | None]:
@@ -124,48 +142,32 @@ def import_net(
             field="--as",
             value=class_name,
         )
-    make = _in_plane if net.on_surface is None else _on_surface
-    return make(drawn, class_name, net, name, rods, out, options)
+    order = _Order(class_name, net, name, rods, out, options)
+    return (_in_plane if net.on_surface is None else _on_surface)(drawn, order)
 
 
-def _in_plane(
-    drawn: DrawnNetwork,
-    class_name: str,
-    net: NetClass,
-    name: str,
-    rods: Rods,
-    out: Path,
-    options: Mapping[str, Any],
-) -> Imported:
+def _in_plane(drawn: DrawnNetwork, order: _Order) -> Imported:
     """Of a net that is flat, or can be laid flat."""
     frame = replace(drawn.frame, origin=drawn.frame.origin + drawn.origin)
     if not drawn.frame.flat:
         drawn, frame = laid_flat(drawn), Frame(drawn.origin, np.eye(3), 0.0)
-    findings = drawn.findings + _doubts(drawn, rods)
+    findings = drawn.findings + _doubts(drawn, order.rods)
     goal = None
-    if options["target"] is not None:
-        target = options["target"]
+    target = order.options["target"]
+    if target is not None:
         ratio, said = scale_beside(target, drawn.drawing)
         findings += said
         # seen from the mesh, whose own units its origin is in
         frame = replace(frame, origin=frame.origin / ratio)
-        goal = mesh_target(relative(target, out), frame, ratio * drawn.options.scale)
-    own = {**options, "target": goal, "free_ends": drawn.options.free_ends}
-    data = design_data(class_name, name, rods, net.content(drawn.entries, own)) | drawn.placed
-    _check(drawn, data, out)
+        goal = mesh_target(relative(target, order.out), frame, ratio * drawn.options.scale)
+    data = order.data(drawn, {"target": goal, "free_ends": drawn.options.free_ends})
+    _check(drawn, data, order.out)
     return Imported(data, drawn, findings)
 
 
-def _on_surface(
-    drawn: DrawnNetwork,
-    class_name: str,
-    net: NetClass,
-    name: str,
-    rods: Rods,
-    out: Path,
-    options: Mapping[str, Any],
-) -> Imported:
+def _on_surface(drawn: DrawnNetwork, order: _Order) -> Imported:
     """Over a net drawn in plan or in space, on a surface or on the net's own."""
+    net, out, options = order.net, order.out, order.options
     scale, surface, chart = drawn.options.scale, options["surface"], options["chart"]
     meshes = {}
     if surface is None:
@@ -194,9 +196,8 @@ def _on_surface(
         drawn = replace(drawn, findings=drawn.findings + said)
         if chart == "conformal":
             drawn = replace(drawn, entries=_in_chart(drawn, mesh))
-    findings = drawn.findings + _doubts(drawn, rods)
-    own = net.content(drawn.entries, {**options, "surface": where})
-    data = design_data(class_name, name, rods, own) | drawn.placed
+    findings = drawn.findings + _doubts(drawn, order.rods)
+    data = order.data(drawn, {"surface": where})
     assert net.on_surface is not None
     _check(drawn, data, out, partial(net.on_surface, mesh) if meshes else None)
     return Imported(data, drawn, findings, meshes)

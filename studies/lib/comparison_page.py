@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from kop_exudyn.report.designs import draw_designs
 from kop_exudyn.report.kit_drawings import drawn_stages
 from kop_exudyn.search.result import KitResult
+from kop_exudyn.wording import counted_parts
 
 from .comparison import Row, draw_comparison, most_changed
 from .study import Study, StudyReport
@@ -53,9 +54,9 @@ def _published(row: Row) -> bool:
 
 def realised(result: KitResult) -> str:
     """Which parts realise how many elements, without a full stop."""
-    sizes = " and ".join(f"{count} {kind}" for kind, count in result.kit.sizes.items())
     elements = sum(design.n_elements for design in result.designs)
-    return f"{sizes} parts realise {elements} elements of {len(result.designs)} designs"
+    parts = counted_parts(result.kit.sizes)
+    return f"{parts} realise {elements} elements of {len(result.designs)} designs"
 
 
 def show(

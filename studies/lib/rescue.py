@@ -27,6 +27,7 @@ from kop_exudyn.search.stage_results import StageResult
 from kop_exudyn.search.stages import Stages
 from kop_exudyn.search.weights import Weights
 from kop_exudyn.structures.base import Design
+from kop_exudyn.wording import counted_parts
 
 from .watched_path import WatchedPath, watch
 
@@ -147,8 +148,7 @@ def finding_of(cases: Sequence[Case]) -> str:
 
 
 def _in_words(case: Case) -> str:
-    sizes = " and ".join(f"{count} {kind}" for kind, count in case["parts"].items())
-    return f"{sizes} parts at w_c = {case['weight']:g}"
+    return f"{counted_parts(case['parts'])} at w_c = {case['weight']:g}"
 
 
 def drawn(case: Case, state: str, title: str) -> DrawnState:
