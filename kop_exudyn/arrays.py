@@ -40,5 +40,7 @@ KitVector = Annotated[_Floats, ("n_p",)]
 """The parameters of all parts of a kit, kind after kind."""
 Stresses = Annotated[_Floats, ("n", 6)]
 """Of elements: axial force, two shear forces, torsion, two bending moments, one element a row."""
+StressFactors = Annotated[_Floats, ("m", "r", 6)]
+"""What m elements' generalised stresses are multiplied by, in r sums of each."""
 StressRows = Annotated[_Floats, ("m", 6, "n_q")]
 """Derivatives of m elements' generalised stresses in the parameters."""

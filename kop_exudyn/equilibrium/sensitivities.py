@@ -19,6 +19,7 @@ from ..arrays import (
     ParameterRows,
     Parameters,
     Stresses,
+    StressFactors,
     StressRows,
 )
 from ..rods.element import length_derivative
@@ -31,7 +32,6 @@ from .system import System
 
 # Relative residual of the linear solves beyond which derivatives are worthless.
 _TRUSTED_RESIDUAL = 1e-6
-_CHUNK = 256  # elements at a time, to bound memory
 
 
 class Sensitivities:
@@ -122,40 +122,31 @@ class Sensitivities:
     def stresses(self) -> StressRows:
         """Derivatives (E, 6, n_parameters) of the elements' generalised stresses; memory E x 6 x
         n_parameters."""
-        scene, s = self._system.scene, self._system.sparsity
-        kept = np.concatenate(
-            [self.full, self._driven_map.toarray(), np.zeros((1, scene.n_parameters))]
-        )
-        out = np.empty((len(scene.elements), 6, scene.n_parameters))
-        factor = self._B * (scene.stiffness / self._lengths[:, None])[:, :, None]
-        for first in range(0, len(out), _CHUNK):  # absent unknowns (-1) read the row of zeros
-            some = slice(first, first + _CHUNK)
-            np.matmul(factor[some], kept[s.rows[some]], out=out[some])
-        has = self._has
-        out[has, :, scene.length_parameter[has]] += (
-            self._stress_L[has] * scene.length_factor[has][:, None]
-        )
-        return out
+        return self.stresses_of(np.arange(len(self._system.scene.elements)))
 
     def stresses_of(self, elements: Indices) -> StressRows:
         """Derivatives (m, 6, n_parameters) of some elements' generalised stresses."""
-        scene, s = self._system.scene, self._system.sparsity
-        own = s.rows[elements]
-        kept, place = np.unique(own, return_inverse=True)  # absent unknowns are -1
-        values = np.zeros((len(kept), scene.n_parameters))
+        rows = self.stress_rows(elements, np.broadcast_to(np.eye(6), (len(elements), 6, 6)))
+        return rows.reshape(len(elements), 6, -1)
+
+    def stress_rows(self, elements: Indices, factors: StressFactors) -> ParameterRows:
+        """Derivatives (m r, n_parameters) of sums of elements' generalised stresses, r of each of
+        m elements with their factors (m, r, 6); element by element."""
+        system, scene = self.system, self._system.scene
+        stiffness = scene.stiffness[elements] / self._lengths[elements][:, None]
+        blocks = factors @ (self._B[elements] * stiffness[:, :, None])
+        kept = system.sparsity.rows[elements][:, None]  # absent unknowns are -1
         free, driven = (kept >= 0) & (kept < self._n), kept >= self._n
-        values[free] = self.solutions.rows(kept[free])
-        values[driven] = self._driven_map[kept[driven] - self._n].toarray()
-        factor = (
-            self._B[elements]
-            * (scene.stiffness[elements] / self._lengths[elements][:, None])[:, :, None]
-        )
-        out = factor @ values[place.reshape(own.shape)]
+        out = self.solutions.product(_rows_of(blocks, kept, free, self._n))
+        if driven.any():
+            own = _rows_of(blocks, kept - self._n, driven, self._driven_map.shape[0])
+            own = (own @ self._driven_map).tocoo()
+            out[own.row, own.col] += own.data
         has = np.flatnonzero(scene.length_parameter[elements] >= 0)
-        of = elements[has]
-        out[has, :, scene.length_parameter[of]] += (
-            self._stress_L[of] * scene.length_factor[of][:, None]
-        )
+        of, r = elements[has], factors.shape[1]
+        direct = np.einsum("mrs,ms->mr", factors[has], self._stress_L[of])
+        direct *= scene.length_factor[of][:, None]
+        out[r * has[:, None] + np.arange(r), scene.length_parameter[of][:, None]] += direct
         return out
 
     def stress_adjoint(self, cotangent: Stresses) -> Parameters:
@@ -361,6 +352,16 @@ class Sensitivities:
         block = np.einsum("eri,er->ei", self._B, scene.stiffness * values / self._lengths[:, None])
         keep = s.rows >= 0
         return np.bincount(s.rows[keep], block[keep], minlength=s.n_free + s.n_driven)
+
+
+def _rows_of(blocks: np.ndarray, columns: np.ndarray, there: np.ndarray, n: int) -> sp.csr_matrix:
+    """Blocks (m, r, k) as the rows (m r, n) of a sparse matrix: their columns (m, 1, k), and which
+    of these are there; the others count as zeros."""
+    m, r, k = blocks.shape
+    data = np.where(there, blocks, 0.0)
+    indices = np.broadcast_to(np.where(there, columns, 0), blocks.shape)
+    starts = np.arange(0, m * r * k + 1, k)
+    return sp.csr_matrix((data.ravel(), indices.ravel(), starts), shape=(m * r, n))
 
 
 def _weight_gradient_per_length(scene: Scene, state: State) -> np.ndarray:

@@ -21,7 +21,8 @@ from ..equilibrium.exudyn_confirm import confirm
 from ..equilibrium.newton import NewtonOptions, refine, solve
 from ..equilibrium.sensitivities import Sensitivities
 from ..errors import InputError, SimulationFailure
-from ..structures.base import Design
+from ..scene.state import State
+from ..structures.base import Design, Role
 from ..structures.fitting import Placement, TargetFitting, best_placement
 from ..structures.load_bound import LoadBound
 from ..structures.opening import SAME_STATE
@@ -68,6 +69,7 @@ class DesignObjective:
             }
             self._bounds = {name: bound for name, bound in bounds.items() if bound.known}
         self._way = design.way if requirements.opening else None
+        self.last_snapped = 0  # which of the required sets of errors made the design snap last
         self._loads = self._load_bounds() if requirements.loads else []
 
     def _load_bounds(self) -> list[LoadBound]:
@@ -102,13 +104,33 @@ class DesignObjective:
         for role in self.design.roles:
             if fitted_only and not role.fitted:
                 continue
-            try:
-                found = self._solve(role.name, q, starts[role.name], role.opening, options)
-                self.design.check_state(role.name, found.state)
-                equilibria[role.name] = found
-            except SimulationFailure as failure:
-                raise failure.within(f"{self.design.name}: {role.name} state") from None
+            equilibria[role.name] = self._found(role, q, starts[role.name], options)
         return self.judge(q, equilibria)
+
+    def fitted_at(self, q: np.ndarray, near: Evaluation, start: Start) -> Equilibrium:
+        """The fitted role's state alone at q, from a start that an evaluation's state predicts.
+
+        Raises SimulationFailure as `evaluate` does.
+        """
+        role = self.design.fitted_role
+        return self._found(role, q, near.equilibria[role.name], _TRIAL, start)
+
+    def _found(
+        self,
+        role: Role,
+        q: np.ndarray,
+        near: Equilibrium,
+        options: NewtonOptions,
+        start: Start | None = None,
+    ) -> Equilibrium:
+        """A role's state at q, warm-started; SimulationFailure, naming design and role, where there
+        is none, or one that can't be."""
+        try:
+            found = self._solve(role.name, q, near, role.opening, options, start)
+            self.design.check_state(role.name, found.state)
+        except SimulationFailure as failure:
+            raise failure.within(f"{self.design.name}: {role.name} state") from None
+        return found
 
     def redeploy(self, q: np.ndarray) -> Evaluation:
         """F at q, every role solved from the design's own starting geometry, with the states on its
@@ -264,17 +286,17 @@ class DesignObjective:
         joints = fitted.state.positions[self.design.joints]
         return replace(evaluation, fit=self._fitting.minimum_zone(joints, evaluation.fit))
 
-    def deviation_near(self, evaluation: Evaluation, near: Evaluation) -> float:
-        """The largest deviation of a state where it is placed best, % of the size.
+    def deviation_near(self, state: State, near: Evaluation) -> float:
+        """The largest deviation of a fitted state where it is placed best, % of the size.
 
         near : another state of the design, whose placement is known
         """
         role, joints = self.design.fitted_role.name, self.design.joints
-        x, y = (e.equilibria[role].state.positions[joints] for e in (evaluation, near))
+        x, y = (at.positions[joints] for at in (state, near.equilibria[role].state))
         onto = best_placement(x, y)
         place = near.fit.placement
         start = Placement(place.rotation @ onto.rotation, place.apply(onto.translation[None])[0])
-        return self._fitting.minimum_zone(x, replace(evaluation.fit, placement=start)).max_percent
+        return self._fitting.minimum_zone(x, replace(near.fit, placement=start)).max_percent
 
     def _refined(self, evaluation: Evaluation) -> Evaluation:
         """The same evaluation with its states converged to round-off."""
@@ -332,11 +354,13 @@ class DesignObjective:
         near: Equilibrium,
         opening: float | None,
         options: NewtonOptions,
+        start: Start | None = None,
     ) -> Equilibrium:
         system = self.design.systems[role]
         if np.array_equal(q, near.q) and opening == near.opening:
             return replace(near, iterations=0, escapes=0, wall_s=0.0)
-        start: Start = Sensitivities(system, near).predict(q - near.q)
+        if start is None:
+            start = Sensitivities(system, near).predict(q - near.q)
         try:
             return solve(system, q, start, opening, options)
         except SimulationFailure:

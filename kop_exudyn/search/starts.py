@@ -26,6 +26,7 @@ from .forgiving import DEAR, forgiving_stage, secured_steps, substitute
 from .opening import opened_stage
 from .problems import AssignedProblem
 from .reassign import LocalModel, Reassignment, improved
+from .remaking import made_otherwise
 from .settings import EFFORTS, Effort
 from .shaking import shaken
 from .stage_results import StageResult
@@ -146,11 +147,12 @@ def forgiving_from_starts(
     starts than the best one where that ended in designs that snap, or in a far higher J so as to
     keep them from it; `result` where none is better.
 
-    Whether a kit forgives can't be told from J: kits of nearly the same J differ in it. So the ends
-    of the other starts are looked at, and then starts that weren't optimised, a few at most. Where
-    a design opens into quite another state, the way back from there is long: results on the way to
-    that end are looked at first, and the way back is gone where these cost much, or nothing else
-    forgives. In the end, `forgiving_stage` has its last resorts.
+    Whether a kit forgives can't be told from J: kits of nearly the same J differ in it. What costs
+    least is to make the designs that snap of the same parts otherwise. Where that doesn't help, or
+    costs much, the ends of the other starts are looked at, and then starts that weren't optimised,
+    a few at most. Where a design opens into quite another state, the way back from there is long:
+    results on the way to that end are looked at first, and the way back is gone where these cost
+    much, or nothing else forgives. In the end, `forgiving_stage` has its last resorts.
 
     result : of the best start, without these
     """
@@ -160,7 +162,11 @@ def forgiving_from_starts(
     tried, first = found.tried, found.first
     optimised = {n for n, _ in found.others}
     kept = next(n for n, one in enumerate(tried) if one.kept)
-    winners = [] if result.snapping else [(kept, result)]
+    same = _of_the_same_parts(stages, result, count(first))
+    if same is not None and same.merit <= dear:
+        return same
+    first += _NUMBERS
+    winners = [] if same is None else [(kept, same)]
     put_off: list[tuple[StageResult, int, StageResult, Iterator[int]]] = []
 
     def opened_from(n: int, end: StageResult, numbers: Iterator[int], there: StageResult) -> None:
@@ -201,6 +207,20 @@ def forgiving_from_starts(
     tried[:] = [replace(one, kept=k == which) for k, one in enumerate(tried)]
     log.info("start %d forgives, at J = %s, from %s", which + 1, won.value, result.value)
     return replace(won, steps=result.steps + won.steps, jumps=result.jumps)
+
+
+def _of_the_same_parts(
+    stages: Stages, result: StageResult, numbers: Iterator[int]
+) -> StageResult | None:
+    """A result that forgives, its designs that snap made of the same parts otherwise and the parts
+    optimised from there; None where that doesn't help."""
+    if not result.snapping:
+        return result
+    mended, still = made_otherwise(stages, result, result.snapping)
+    if still:
+        return None
+    won = secured_steps(stages, mended, numbers, forgiving=True)
+    return replace(won, snapping=(), jumps=result.jumps)
 
 
 def _candidates(found: Starts) -> list[tuple[int, StageResult]]:
