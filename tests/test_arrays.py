@@ -136,6 +136,9 @@ def test_sensitivities(result):
     for name in ("energy_gradient", "potential_gradient", "torque_gradient"):
         assert why_not(getattr(found, name), "Parameters", dict(sizes)) == []
     assert why_not(found.full, "ParameterRows", dict(sizes)) == []
+    factors = np.ones((3, 2, 6))
+    assert why_not(factors, "StressFactors", {}) == []
+    assert why_not(found.stress_rows(np.arange(3), factors), "ParameterRows", dict(sizes)) == []
 
 
 def test_wrong_shapes_and_kinds_are_seen():

@@ -94,13 +94,12 @@ def proven(stages: Stages, result: StageResult) -> StageResult:
     the workshop isn't worth a shape that is far off."""
     if result.value is None:
         return result
-    proving = stages.proving()
-    lost = proving.snapping(result)
+    lost = stages.unproved(result)
     if not lost:
         return replace(result, snapping=()) if result.snapping else result
     names = [stages.dataset.designs[n].name for n in lost]
     log.info("in more sets of errors %s snap", ", ".join(names))
-    mended, still = made_otherwise(proving, result, lost)
+    mended, still = made_otherwise(stages.proving(), result, lost)
     return result if mended is result else replace(mended, snapping=still)
 
 

@@ -23,6 +23,7 @@ from .stages import Stages
 log = logging.getLogger(__name__)
 
 _LOOKED_AT = 6  # results on the way, at most
+_MENDED = 2  # of these, the best ones: designs that snap are made otherwise
 _REMAKINGS = 3  # rounds in which designs that are far off are made of other parts, at most
 _FELT = 5.0  # times the level: where the largest deviation is beyond that, other parts are tried
 
@@ -65,8 +66,8 @@ def level(stages: Stages, result: StageResult, numbers: Iterator[int]) -> StageR
             )
             ends.append(last)
         steps = result.steps + last.steps
-    for trial in sorted(ends, key=lambda one: worst(one.designs))[:_LOOKED_AT]:
-        found = proved(stages, secured.weighed(trial), before)
+    for k, trial in enumerate(sorted(ends, key=lambda one: worst(one.designs))[:_LOOKED_AT]):
+        found = proved(stages, secured.weighed(trial), before, mended=k < _MENDED)
         if found is not None:
             log.info(
                 "largest deviation %.3g %%, from %.3g %%, at J = %.5g, from %.5g",
@@ -89,20 +90,24 @@ def _far(result: StageResult, felt: float) -> list[int]:
     return sorted(off, key=lambda n: -off[n])
 
 
-def proved(stages: Stages, found: StageResult, before: StageResult) -> StageResult | None:
+def proved(
+    stages: Stages, found: StageResult, before: StageResult, mended: bool = True
+) -> StageResult | None:
     """A result that is better than before and makes no other designs snap, in more sets of errors
-    than steps are tried with; designs that do are made of the same parts otherwise. None where that
-    doesn't help."""
+    than steps are tried with. None where there is none.
+
+    mended : whether designs that do are made of the same parts otherwise
+    """
     if found.value is None or not _better(stages, found, before):
         return None
-    proving = stages.proving()
-    snapping = proving.snapping(found)
-    if lost := sorted(set(snapping) - set(before.snapping)):
-        found, still = made_otherwise(proving, found, lost)
+    members = [n for n in range(len(found.designs)) if n not in before.snapping]
+    if lost := stages.unproved(found, members):
+        if not mended:
+            return None
+        found, still = made_otherwise(stages.proving(), found, lost)
         if still or not _better(stages, found, before):
             return None
-        snapping = tuple(n for n in snapping if n not in lost)
-    return replace(found, snapping=snapping)
+    return replace(found, snapping=before.snapping)
 
 
 def worst(designs: Sequence[object]) -> float:

@@ -28,6 +28,7 @@ from ..structures.stacking import (
     stacked_parameters,
 )
 from ..units import common_units, unit_of, unnamed_units
+from ..wording import counted
 from .checkpoints import NoStore, Store
 from .dataset import Dataset
 from .evaluation import Evaluation
@@ -313,7 +314,8 @@ def _lacks(missing: Sequence[Missing], designs: Sequence[Design], stock: Stock) 
     found = []
     for one in missing:
         whose = "all designs together" if one.design is None else designs[one.design].name
-        text = f"{one.number} {one.kind} pieces are missing for {whose}"
+        missed = counted(one.number, f"{one.kind} piece is", f"{one.kind} pieces are")
+        text = f"{missed} missing for {whose}"
         if one.copies is not None:
             parts = stock.kit[one.kind]
             quantity = "angle" if part_kind(one.kind).angular else "length"

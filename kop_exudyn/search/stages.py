@@ -39,6 +39,7 @@ _AT_A_STEP = 100  # of them, of all designs together
 _PROOF_MARGIN = (
     1.25  # how much larger than a workshop's are the errors that prove a result, at most
 )
+_SURE = 100  # sets of errors as large as a workshop's, of which none may make a design snap
 
 
 class Stages:
@@ -286,6 +287,26 @@ class Stages:
             seed=self.required.seed + 1,
         )
         return other
+
+    def unproved(self, result: StageResult, among: Sequence[int] | None = None) -> tuple[int, ...]:
+        """The designs that other and more sets of errors than steps are tried with make snap.
+
+        Errors larger than a workshop's tell it in few sets. A design that one of them makes snap
+        isn't lost yet: as many sets of the workshop's own errors as a share of one in a hundred is
+        told by have the last word.
+
+        among : default: all designs
+        """
+        designs = range(len(result.designs)) if among is None else among
+        doubtful = self.proving().snapping_among(result, designs)
+        sure = copy(self)
+        sure.required = replace(
+            self.required,
+            samples=max(_SURE, self.required.samples) if self.required.samples else 0,
+            margin=min(self.required.margin, 1.0),
+            seed=self.required.seed + 2,
+        )
+        return sure.snapping_among(result, doubtful)
 
     def calmer(self, factor: float) -> Stages:
         """The same stages with all terms but the fit weighing more: less stress and energy leave a

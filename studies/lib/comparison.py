@@ -44,6 +44,11 @@ _MARKERS = {
 }
 
 
+def told(stage: str) -> str:
+    """The name of a stage as a reader knows it."""
+    return stage.replace("_", " and ")
+
+
 def comparison_rows(class_name: str, result: KitResult) -> list[dict[str, Any]]:
     """One row a design: largest and mean deviations after every stage, energies, where it buckled
     or failed."""
@@ -56,23 +61,27 @@ def comparison_rows(class_name: str, result: KitResult) -> list[dict[str, Any]]:
             "elements": design.n_elements,
         }
         shown = {"input": result.input_summary(n), **found}
-        row |= {f"{stage} max %": _fit(summary, "max_percent") for stage, summary in shown.items()}
+        row |= {
+            f"{told(stage)} max %": _fit(summary, "max_percent") for stage, summary in shown.items()
+        }
         row |= {
             f"{stage} mean %": _fit(shown.get(stage), "mean_percent")
             for stage in ("direct", "assigned")
         }
         row |= _verdict(result, n)
-        row |= {f"{stage} energy": summary.get("energy_ratio") for stage, summary in found.items()}
+        row |= {
+            f"{told(stage)} energy": summary.get("energy_ratio") for stage, summary in found.items()
+        }
         row["buckled"] = (
             ", ".join(
-                stage
+                told(stage)
                 for stage in found
                 if buckled(design, result.stages[stage].designs[n], result.references[n])
             )
             or "–"
         )
         row["failed"] = (
-            ", ".join(stage for stage, summary in found.items() if "failed" in summary) or "–"
+            ", ".join(told(stage) for stage, summary in found.items() if "failed" in summary) or "–"
         )
         rows.append(row)
     return rows
@@ -97,7 +106,7 @@ def finding(rows: Sequence[Row]) -> str:
     """What the rows say, in a few sentences: first what the method gains, then where it is worse
     than a baseline, then what can't be built."""
     names = {"direct": "direct", "unrelaxed": "unrelaxed", "published_opened": "published method"}
-    values = {stage: _values(rows, f"{stage} max %") for stage in (*names, "assigned")}
+    values = {stage: _values(rows, f"{told(stage)} max %") for stage in (*names, "assigned")}
     medians = ", ".join(
         f"{np.median(values[stage]):.2g} % ({name})"
         for stage, name in names.items()
@@ -115,7 +124,7 @@ def finding(rows: Sequence[Row]) -> str:
     worse = [
         f"{row['design']} ({name}: {row[key]:.2g} %, here {row['assigned max %']:.2g} %)"
         for row in rows
-        for key, name in ((f"{stage} max %", name) for stage, name in names.items())
+        for key, name in ((f"{told(stage)} max %", name) for stage, name in names.items())
         if row.get(key) is not None
         and row["assigned max %"] is not None
         and row[key] < row["assigned max %"]
@@ -135,18 +144,13 @@ def finding(rows: Sequence[Row]) -> str:
             if stopped
             else "All of them open by themselves, keep below their limits and can be built."
         )
-    away = [f"{row['design']} ({_told(row['buckled'])})" for row in rows if row["buckled"] != "–"]
+    away = [f"{row['design']} ({row['buckled']})" for row in rows if row["buckled"] != "–"]
     if away:
         sentences.append(f"Buckled into other states: {', '.join(away)}.")
-    failed = [f"{row['design']} ({_told(row['failed'])})" for row in rows if row["failed"] != "–"]
+    failed = [f"{row['design']} ({row['failed']})" for row in rows if row["failed"] != "–"]
     if failed:
         sentences.append(f"No equilibrium was found for {', '.join(failed)}.")
     return " ".join(sentences)
-
-
-def _told(stages: str) -> str:
-    """Names of stages as a reader knows them."""
-    return stages.replace("_", " and ")
 
 
 def most_changed(designs: list[DrawnDesign], number: int) -> list[DrawnDesign]:
@@ -163,9 +167,11 @@ def draw_comparison(rows: Sequence[Row]) -> Figure:
     """Every design a line, its stages markers on a logarithmic axis of the largest deviation;
     rings: buckled."""
     stages = [
-        stage for stage in ORDER if any(row.get(f"{stage} max %") is not None for row in rows)
+        stage for stage in ORDER if any(row.get(f"{told(stage)} max %") is not None for row in rows)
     ]
-    values = [row[key] for row in rows for stage in stages if row.get(key := f"{stage} max %")]
+    values = [
+        row[key] for row in rows for stage in stages if row.get(key := f"{told(stage)} max %")
+    ]
     low, high = 0.6 * max(min(values), _LEAST_SHOWN), 2.0 * max(values)
     with style():
         figure = Figure(figsize=(8.5, 1.3 + 0.3 * len(rows)), layout="constrained")
@@ -197,7 +203,7 @@ def draw_comparison(rows: Sequence[Row]) -> Figure:
 
 
 def _draw_row(ax: Axes, y: int, row: Row, stages: Sequence[str], failed_at: float) -> None:
-    found = {stage: row.get(f"{stage} max %") for stage in stages}
+    found = {stage: row.get(f"{told(stage)} max %") for stage in stages}
     there = [max(value, _LEAST_SHOWN) for value in found.values() if value is not None]
     if there:
         ax.hlines(y, min(there), max(there), color="#d8d8d8", linewidth=3, zorder=1)
@@ -207,7 +213,7 @@ def _draw_row(ax: Axes, y: int, row: Row, stages: Sequence[str], failed_at: floa
         ax.scatter(
             x, y, color=_COLOURS[stage], marker="x" if missing else _MARKERS[stage], s=34, zorder=3
         )
-        if stage in row["buckled"].split(", "):
+        if told(stage) in row["buckled"].split(", "):
             ax.scatter(x, y, s=_RING, zorder=4, **_AROUND)
 
 

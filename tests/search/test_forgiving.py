@@ -8,7 +8,7 @@ import pytest
 
 from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.io.designs import load_design
-from kop_exudyn.search import remaking
+from kop_exudyn.search import remaking, tolerance
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.evaluation import distance
 from kop_exudyn.search.forgiving import forgiving_stage
@@ -17,7 +17,7 @@ from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.settings import StageSettings
 from kop_exudyn.search.stages import Stages
-from kop_exudyn.search.tolerance import forgives
+from kop_exudyn.search.tolerance import forgives, sample_spread, usual_tolerance
 from kop_exudyn.search.weights import Weights
 
 # far larger errors than a workshop makes: this shell snaps with nothing less
@@ -88,6 +88,35 @@ def test_a_design_is_made_of_the_same_parts_otherwise(found):
     assert np.array_equal(otherwise.kit.vector, careless.kit.vector)
     assert otherwise.assignment.changes(careless.assignment) > 0
     assert otherwise.snapping == () and otherwise.merit <= 1.5 * careless.merit
+
+
+def test_predictions_tell_what_leading_back_tells(found, monkeypatch):
+    """For errors of all sizes, up to where most sets make the shell snap. The control: predictions
+    alone never say that it has snapped."""
+    *_, objective = found
+    shell, careless = objective.design, found[1].designs[0]
+    led = []
+    back = tolerance.snapped
+
+    def counted(*call):
+        led.append(call[1].q)
+        return back(*call)
+
+    monkeypatch.setattr(tolerance, "snapped", counted)
+    told, truth = [], []
+    for factor in (1.0, 2.0, 30.0):
+        errors = usual_tolerance(shell).scaled(factor)
+        samples = sample_spread(shell, careless, errors, 8, confirmed=0.0, objective=objective)
+        for sample in samples:
+            if sample.failed is None:
+                state = objective.evaluate(careless.q + sample.errors, careless)
+                told.append(sample.snapped)
+                truth.append(all(back(objective, state, careless, steps) for steps in (1, 3)))
+    assert told == truth and 0 < sum(truth) < len(truth)
+    assert 0 < len(np.unique(led, axis=0)) < 0.75 * len(truth)
+    monkeypatch.setattr(tolerance, "snapped", lambda *call: False)
+    samples = sample_spread(shell, careless, errors, 8, confirmed=0.0, objective=objective)
+    assert not any(sample.snapped for sample in samples)
 
 
 def test_own_tolerances_and_none(found):

@@ -20,8 +20,11 @@ def search(monkeypatch):
     calls = []
     outcomes = {}
 
+    def numbered():
+        return [outcome for number, outcome in outcomes.items() if number != "otherwise"]
+
     def of(start):
-        return next(outcome for outcome in outcomes.values() if outcome["start"] is start)
+        return next(outcome for outcome in numbered() if outcome["start"] is start)
 
     def optimised(stages, start, numbers, seen):
         calls.append(("optimised", start.value))
@@ -29,7 +32,7 @@ def search(monkeypatch):
         return of(start)["end"]
 
     def ended(end):
-        return next(outcome for outcome in outcomes.values() if outcome["end"] is end)
+        return next(outcome for outcome in numbered() if outcome["end"] is end)
 
     def opened(stages, end, before, numbers, last_resorts, seen, there):
         assert not last_resorts and there.value == ended(end)["opens"]  # not opened once more
@@ -44,6 +47,11 @@ def search(monkeypatch):
         calls.append(("resorts", given.value))
         return result(7.0)
 
+    def otherwise(stages, given, lost):
+        mended = outcomes.get("otherwise")
+        return (given, lost) if mended is None else (mended, ())
+
+    monkeypatch.setattr(starts, "made_otherwise", otherwise)
     monkeypatch.setattr(starts, "assigned_stage", optimised)
     monkeypatch.setattr(starts, "opened_stage", opened)
     monkeypatch.setattr(starts, "substitute", substitute)
@@ -135,3 +143,22 @@ def test_where_no_start_forgives_there_are_last_resorts(search):
     given = found(outcomes, {1: (1.0, 1.0, None, result(1.0, (0,)))})
     assert forgiving_from_starts(stages, given, result(1.0, (0,)), None).value == 7.0
     assert calls[-1] == ("resorts", 1.0)
+
+
+def test_designs_that_snap_are_first_made_of_the_same_parts_otherwise(search):
+    """Where that costs little, no other start is tried."""
+    stages, outcomes, calls = search
+    given = found(outcomes, {1: (1.0, 1.0, None, result(1.0))})
+    outcomes["otherwise"] = result(1.05)
+    won = forgiving_from_starts(stages, given, result(1.0, (0,)), None)
+    assert won.value == 1.05 and won.snapping == () and not calls
+
+
+@pytest.mark.parametrize(("other", "value"), [(1.15, 1.15), (1.4, 1.3)])
+def test_where_that_is_dear_one_more_start_is_tried(search, other, value):
+    stages, outcomes, calls = search
+    given = found(outcomes, {1: (1.0, 1.0, None, result(other))})
+    outcomes["otherwise"] = result(1.3)
+    won = forgiving_from_starts(stages, given, result(1.0, (0,)), None)
+    assert won.value == value and calls == [("optimised", 11.0), ("rounds", 1.0)]
+    assert [one.kept for one in given.tried] == [value == 1.3, value == 1.15]

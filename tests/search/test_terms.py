@@ -8,12 +8,13 @@ from support.grids import coarse_grid
 from support.settings import FEW_STEPS, QUICK
 
 from kop_exudyn.equilibrium.newton import NewtonOptions
+from kop_exudyn.equilibrium.sensitivities import Sensitivities
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.search.objective import DesignObjective
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings
-from kop_exudyn.search.terms import base
+from kop_exudyn.search.terms import base, stress
 from kop_exudyn.search.weights import Weights
 from kop_exudyn.structures.base import design_from_dict
 
@@ -63,6 +64,29 @@ def test_gradient_by_taylor(design, weights):
     assert (
         np.linalg.eigvalsh(found.model).min() >= -1e-9 * np.abs(found.model).max() or weights.energy
     )
+
+
+def test_model_of_the_stress_is_gauss_newtons(design):
+    """But for the rows that carry next to nothing: against all rows, summed up one by one."""
+    objective = DesignObjective(design, Weights(fit=0, energy=0, others=(("stress", 1.0),)))
+    rng = np.random.default_rng(2)
+    q = design.parameters * (1 + 0.01 * rng.uniform(-1, 1, len(design.parameters)))
+    at = objective.evaluate(q, options=TIGHT)
+    found = objective.derivatives(at).model
+    term = stress.Stress(design, objective.reference)
+    whole = np.zeros_like(found)
+    for role in design.roles:
+        sensitivities = Sensitivities(design.systems[role.name], at.equilibria[role.name])
+        rows = sensitivities.stresses
+        slope, diagonal, along, less = term._by_stress(role, at.equilibria[role.name])
+        by_q = np.einsum("er,erq->q", slope, rows)
+        across = np.einsum("er,erq->eq", along, rows)
+        whole += np.einsum("erq,er,erp->qp", rows, diagonal, rows, optimize=True)
+        whole += across.T @ across - less * np.outer(by_q, by_q)
+    off = np.linalg.norm(found - whole, 2) / np.linalg.norm(whole, 2)
+    assert off < 5e-3
+    assert np.linalg.eigvalsh(found).min() >= -1e-9 * np.abs(found).max()
+    assert np.linalg.norm(0.97 * whole - whole, 2) / np.linalg.norm(whole, 2) > 5 * off  # control
 
 
 def test_weights_by_name():
