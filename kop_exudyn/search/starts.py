@@ -216,7 +216,7 @@ def _of_the_same_parts(
     optimised from there; None where that doesn't help."""
     if not result.snapping:
         return result
-    mended, still = made_otherwise(stages, result, result.snapping)
+    mended, still = made_otherwise(stages, result, result.snapping, dear=True)
     if still:
         return None
     won = secured_steps(stages, mended, numbers, forgiving=True)

@@ -47,7 +47,7 @@ def search(monkeypatch):
         calls.append(("resorts", given.value))
         return result(7.0)
 
-    def otherwise(stages, given, lost):
+    def otherwise(stages, given, lost, dear):
         mended = outcomes.get("otherwise")
         return (given, lost) if mended is None else (mended, ())
 
@@ -131,7 +131,7 @@ def test_a_dear_result_is_bettered_by_one_more_start(search):
     won = forgiving_from_starts(stages, given, result(1.4), None)
     assert won.value == 1.15 and given.tried[1].kept
     assert calls == [("optimised", 11.0), ("on the way", 11.0), ("rounds", 1.0)]
-    dear = result(1.12)
+    dear = result(1.3)
     calls.clear()
     given = found(outcomes, {1: (1.0, 9.0, result(1.3), result(1.4, (0,)))})
     assert forgiving_from_starts(stages, given, dear, None) is dear
