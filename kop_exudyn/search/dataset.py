@@ -22,7 +22,7 @@ from .evaluation import DesignDerivatives, Evaluation
 from .objective import DesignObjective, Reference
 from .pool import DesignPool
 from .requirements import Requirements
-from .tolerance import forgives
+from .tolerance import forgives, unforgiven
 from .weights import Weights
 
 P = ParamSpec("P")
@@ -55,6 +55,8 @@ class Dataset:
     design_weights : how much each of these counts
     requirements : that designs have to meet
     exempt : those of the pool's designs that errors of the workshop may make snap nevertheless
+    minded : sets of errors (nq,) by the pool's designs that must not make them snap, besides the
+        required ones
     tally : counts what was solved
     """
 
@@ -65,6 +67,7 @@ class Dataset:
     requirements: Requirements = Requirements.none()
     tally: Tally = field(default_factory=Tally)
     exempt: frozenset[int] = frozenset()
+    minded: Mapping[int, Sequence[np.ndarray]] = field(default_factory=dict)
 
     @classmethod
     def of_pool(
@@ -308,8 +311,14 @@ class Dataset:
         if not self.requirements.samples:
             return []
         asked = {n: e for n, e in evaluations.items() if self.numbers[n] not in self.exempt}
-        told = self._map(forgives, {n: (e,) for n, e in asked.items()})
+        besides = {n: self.minded.get(self.numbers[n], ()) for n in asked}
+        told = self._map(forgives, {n: (e, besides[n]) for n, e in asked.items()})
         return [n for n, forgiving in told.items() if forgiving is not True]
+
+    def unforgiven(self, evaluations: Mapping[int, Evaluation]) -> dict[int, list[np.ndarray]]:
+        """The required sets of errors (nq,) that make designs snap, of those that snap."""
+        found = self._map(unforgiven, {n: (e,) for n, e in evaluations.items()})
+        return {n: sets for n, sets in found.items() if isinstance(sets, list) and sets}
 
     def judge(
         self,

@@ -10,7 +10,7 @@ and forgiving; so do the reassignments that follow where a design is still far o
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from .assigned import further_rounds
@@ -23,7 +23,8 @@ from .stages import Stages
 log = logging.getLogger(__name__)
 
 _LOOKED_AT = 6  # results on the way, at most
-_MENDED = 2  # of these, the best ones: designs that snap are made otherwise
+_MENDED = 1  # of these, the best ones: designs that snap are made otherwise
+_AGAIN = 2  # times that steps are taken once more, minding what made their end snap, at most
 _REMAKINGS = 3  # rounds in which designs that are far off are made of other parts, at most
 _FELT = 5.0  # times the level: where the largest deviation is beyond that, other parts are tried
 
@@ -43,16 +44,27 @@ def level(stages: Stages, result: StageResult, numbers: Iterator[int]) -> StageR
         return result
     before = stages.confirmed(result)  # and placed best
     settings, secured = stages.settings, stages.secured(forgiving=True, but=result.snapping)
-    levelled = secured.levelled(share)
-    start = levelled.kept(levelled.weighed(result))
+    start = secured.levelled(share).kept(secured.levelled(share).weighed(result))
     if start.value is None:
         return result
-    label = SQPLabel.of_levelling(next(numbers))
-    end = levelled.assigned(start, label, settings.round_steps, settings.round_tolerance)
-    ends, steps = [end], result.steps + end.steps
-    felt = 100 * _FELT * share
+    ends: list[StageResult] = []
+
+    def levelled(minding: Stages) -> Stages:
+        return minding.secured(forgiving=True, but=result.snapping).levelled(share)
+
+    def stepped(minding: Stages) -> StageResult:
+        label = SQPLabel.of_levelling(next(numbers))
+        return levelled(minding).assigned(
+            start, label, settings.round_steps, settings.round_tolerance
+        )
+
+    # what isn't proved now needn't be then
+    doubtful = {*result.snapping, *stages.unproved(before)}
+    members = [n for n in range(len(result.designs)) if n not in doubtful]
+    end, minding = _minding(stages, stepped, members, ends)
+    steps, felt = result.steps + end.steps, 100 * _FELT * share
     if worst(end.designs) > felt:
-        careful = stages.careful().secured(forgiving=True, but=result.snapping).levelled(share)
+        careful = levelled(minding.careful())
         last = further_rounds(careful, end, numbers, SQPLabel.of_levelling, ends)
         ends.append(last)
         for number in range(_REMAKINGS):
@@ -67,7 +79,7 @@ def level(stages: Stages, result: StageResult, numbers: Iterator[int]) -> StageR
             ends.append(last)
         steps = result.steps + last.steps
     for k, trial in enumerate(sorted(ends, key=lambda one: worst(one.designs))[:_LOOKED_AT]):
-        found = proved(stages, secured.weighed(trial), before, mended=k < _MENDED)
+        found = proved(stages, secured.weighed(trial), before, members, mended=k < _MENDED)
         if found is not None:
             log.info(
                 "largest deviation %.3g %%, from %.3g %%, at J = %.5g, from %.5g",
@@ -78,6 +90,37 @@ def level(stages: Stages, result: StageResult, numbers: Iterator[int]) -> StageR
             )
             return replace(found, steps=steps, jumps=result.jumps)
     return replace(result, steps=steps)
+
+
+def _minding(
+    stages: Stages,
+    run: Callable[[Stages], StageResult],
+    members: Sequence[int],
+    ends: list[StageResult],
+) -> tuple[StageResult, Stages]:
+    """Where steps lead to that mind the sets of errors that made designs snap where steps led to
+    before; and the stages that mind these.
+
+    Few sets are tried at each step, so that steps come to where just these are forgiven. More of
+    them would cost as much at every step; those that tell are few.
+
+    run : takes the steps
+    members : the designs that must not snap
+    ends : gets the results
+    """
+    for _ in range(_AGAIN):
+        end = run(stages)
+        ends.append(end)
+        weighed = stages.secured().weighed(end)  # where distances are measured depends on it
+        lost = stages.unproved(weighed, members)
+        if not lost:
+            return end, stages
+        names = [stages.dataset.designs[n].name for n in lost]
+        log.info("in more sets of errors %s snap: once more, minding these", ", ".join(names))
+        stages = stages.minding(weighed, lost)
+    end = run(stages)
+    ends.append(end)
+    return end, stages
 
 
 def _far(result: StageResult, felt: float) -> list[int]:
@@ -91,16 +134,22 @@ def _far(result: StageResult, felt: float) -> list[int]:
 
 
 def proved(
-    stages: Stages, found: StageResult, before: StageResult, mended: bool = True
+    stages: Stages,
+    found: StageResult,
+    before: StageResult,
+    members: Sequence[int] | None = None,
+    mended: bool = True,
 ) -> StageResult | None:
     """A result that is better than before and makes no other designs snap, in more sets of errors
     than steps are tried with. None where there is none.
 
-    mended : whether designs that do are made of the same parts otherwise
+    members : the designs that this is asked of; default: those that don't snap before
+    mended : whether designs that do snap are made of the same parts otherwise
     """
     if found.value is None or not _better(stages, found, before):
         return None
-    members = [n for n in range(len(found.designs)) if n not in before.snapping]
+    if members is None:
+        members = [n for n in range(len(found.designs)) if n not in before.snapping]
     if lost := stages.unproved(found, members):
         if not mended:
             return None

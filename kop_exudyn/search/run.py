@@ -207,12 +207,9 @@ def _levelled(
 
 
 def _own_level(stages: Stages, result: StageResult, numbers: Iterator[int]) -> StageResult:
-    """The result levelled, or as it is, proved with more errors."""
-    found = level(stages, result, numbers)
-    if found.designs is not result.designs and not found.snapping:  # has been proved already
-        return found
-    mended = proven(stages, found)
-    return mended if mended is found else level(stages, mended, numbers)
+    """The result proved with more errors, and levelled from there."""
+    found = level(stages, proven(stages, result), numbers)
+    return proven(stages, found) if found.snapping else found
 
 
 def _confirmed(stages: Stages, outcome: StageResult) -> StageResult:

@@ -288,25 +288,41 @@ class Stages:
         )
         return other
 
-    def unproved(self, result: StageResult, among: Sequence[int] | None = None) -> tuple[int, ...]:
-        """The designs that other and more sets of errors than steps are tried with make snap.
-
-        Errors larger than a workshop's tell it in few sets. A design that one of them makes snap
-        isn't lost yet: as many sets of the workshop's own errors as a share of one in a hundred is
-        told by have the last word.
-
-        among : default: all designs
-        """
-        designs = range(len(result.designs)) if among is None else among
-        doubtful = self.proving().snapping_among(result, designs)
-        sure = copy(self)
-        sure.required = replace(
+    def sure(self) -> Stages:
+        """The same stages with as many sets of errors as large as a workshop's, and other ones, as
+        tell a share of one in a hundred."""
+        other = copy(self)
+        other.required = replace(
             self.required,
             samples=max(_SURE, self.required.samples) if self.required.samples else 0,
             margin=min(self.required.margin, 1.0),
             seed=self.required.seed + 2,
         )
-        return sure.snapping_among(result, doubtful)
+        return other
+
+    def unproved(self, result: StageResult, among: Sequence[int] | None = None) -> tuple[int, ...]:
+        """The designs that other and more sets of errors than steps are tried with make snap.
+
+        Errors larger than a workshop's tell it in few sets. A design that one of them makes snap
+        isn't lost yet: more sets of the workshop's own errors have the last word.
+
+        among : default: all designs
+        """
+        designs = range(len(result.designs)) if among is None else among
+        return self.sure().snapping_among(result, self.proving().snapping_among(result, designs))
+
+    def minding(self, result: StageResult, members: Sequence[int]) -> Stages:
+        """The same stages with those sets of errors required besides that make some designs of a
+        result snap, of all those that prove it."""
+        other = copy(self)
+        minded = {number: list(sets) for number, sets in self.dataset.minded.items()}
+        designs = {n: d for n in members if isinstance(d := result.designs[n], Evaluation)}
+        for stages in (self.sure(), self.proving()):
+            found = self.dataset.requiring(stages.required).unforgiven(designs)
+            for n, sets in found.items():
+                minded.setdefault(self.dataset.numbers[n], []).extend(sets)
+        other.dataset = replace(self.dataset, minded=minded)
+        return other
 
     def calmer(self, factor: float) -> Stages:
         """The same stages with all terms but the fit weighing more: less stress and energy leave a

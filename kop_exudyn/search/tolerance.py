@@ -37,6 +37,7 @@ _USUAL_ANGLE = np.radians(0.1)
 _STEPS_BACK = (1, 3)
 CONFIRMED = 0.1  # share of the samples that Exudyn confirms
 _SEARCH = (0, 1)  # seed of the errors that a search tries
+_REMEMBERED = 8  # states that are asked for again, of each design
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,11 @@ class Sample:
     snapped: bool = False
     confirmed: bool = False
 
+    @property
+    def lost(self) -> bool:
+        """Whether the design isn't in its shape."""
+        return self.snapped or self.failed is not None
+
 
 def joint_jacobian(design: Design, evaluation: Evaluation) -> np.ndarray:
     """(3n, nq) derivative of the fitted state's joints in the parameters, rigid motions taken
@@ -126,13 +132,48 @@ def sample_spread(
     return list(_samples(objective, evaluation, sets, confirmed))
 
 
-def forgives(objective: DesignObjective, evaluation: Evaluation) -> bool:
+def forgives(
+    objective: DesignObjective, evaluation: Evaluation, besides: Sequence[np.ndarray] = ()
+) -> bool:
     """Whether none of the sets of errors that the objective's requirements name makes a design
     snap. They are other sets than those that `sample_spread` draws for a verdict.
 
     objective : of the design, with the requirements
     evaluation : of the design's parameters, with its states
+    besides : sets of errors (nq,) that are tried first
     """
+    state = evaluation.equilibria[objective.design.fitted_role.name]
+    key = (evaluation.q.tobytes(), f"{state.elastic_energy:.6e}", len(besides))
+    if key in objective.forgiven:
+        return objective.forgiven[key]
+    told = _forgives(objective, evaluation, [*besides, *_required_sets(objective)])
+    while len(objective.forgiven) >= _REMEMBERED:
+        objective.forgiven.pop(next(iter(objective.forgiven)))
+    objective.forgiven[key] = told
+    return told
+
+
+def _forgives(
+    objective: DesignObjective, evaluation: Evaluation, sets: Sequence[np.ndarray]
+) -> bool:
+    # that which made it snap last is the likeliest to do so again, a little further on
+    order = sorted(range(len(sets)), key=lambda k: k != objective.last_snapped)
+    samples = _samples(objective, evaluation, [sets[k] for k in order], 0.0, placed=False)
+    for k, sample in zip(order, samples):
+        if sample.lost:
+            objective.last_snapped = k
+            return False
+    return True
+
+
+def unforgiven(objective: DesignObjective, evaluation: Evaluation) -> list[np.ndarray]:
+    """Those of the required sets of errors (nq,) that make a design snap, see `forgives`."""
+    samples = _samples(objective, evaluation, _required_sets(objective), 0.0, placed=False)
+    return [sample.errors for sample in samples if sample.lost]
+
+
+def _required_sets(objective: DesignObjective) -> list[np.ndarray]:
+    """The sets of errors that an objective's requirements name, the same for the same design."""
     required, design = objective.requirements, objective.design
     usual = usual_tolerance(design)
     tolerance = Tolerance(
@@ -140,15 +181,7 @@ def forgives(objective: DesignObjective, evaluation: Evaluation) -> bool:
         usual.angle if required.angle is None else required.angle,
     ).scaled(required.margin)
     generator = np.random.default_rng([*_SEARCH, required.seed])
-    sets = _sets(design, tolerance, required.samples, generator)
-    # that which made it snap last is the likeliest to do so again, a little further on
-    order = sorted(range(len(sets)), key=lambda k: k != objective.last_snapped)
-    samples = _samples(objective, evaluation, [sets[k] for k in order], 0.0, placed=False)
-    for k, sample in zip(order, samples):
-        if sample.snapped or sample.failed is not None:
-            objective.last_snapped = k
-            return False
-    return True
+    return _sets(design, tolerance, required.samples, generator)
 
 
 def _sets(

@@ -200,20 +200,29 @@ def test_a_kit_that_snaps_in_more_sets_is_made_otherwise(found, monkeypatch):
     assert forgiving.proven(stages, known).snapping == ()
 
 
-def test_a_result_that_is_not_levelled_is_proved_and_levelled_again(found, monkeypatch):
+def test_a_result_is_proved_and_then_levelled(found, monkeypatch):
+    """And proved once more where a design snapped."""
     stages, _, start, after, _ = found
-    levels = []
+    calls = []
 
-    def none(stages, result, numbers):
-        levels.append((result, next(numbers)))
-        return replace(result, steps=result.steps + 1)
+    def levelled(stages, result, numbers):
+        calls.append(("level", result))
+        return result
 
-    monkeypatch.setattr(run, "level", none)
-    monkeypatch.setattr(run, "proven", lambda stages, result: result)
-    assert run._levelled(stages, start).designs is start.designs and levels == [(start, 1)]
-    monkeypatch.setattr(run, "proven", lambda stages, result: after)
-    assert run._levelled(stages, start).designs is after.designs
-    assert levels == [(start, 1), (start, 1), (after, 2)]
+    def proven(stages, result):
+        calls.append(("proven", result))
+        return after if result is start else replace(result, snapping=())
+
+    monkeypatch.setattr(run, "level", levelled)
+    monkeypatch.setattr(run, "proven", proven)
+    assert run._levelled(stages, start) is after
+    assert calls == [("proven", start), ("level", after)]
+    after.snapping = (0,)
+    try:
+        assert run._levelled(stages, start).snapping == ()
+    finally:
+        after.snapping = ()
+    assert [what for what, _ in calls[2:]] == ["proven", "level", "proven"]
 
 
 def test_a_baseline_that_meets_all_and_is_nearer_is_taken(found, monkeypatch):
