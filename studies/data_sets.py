@@ -2,14 +2,14 @@
 
     python studies/data_sets.py [--quick] [--out reports/data_sets] [--jobs 2]
 
-Ten C-shells share 8 linear and 5 angular parts, as the ten of Becker et al. (2024) do: five
-conformal images of a square, and a fan, a hexagon, a ring, a skew net and a triangle. Five umbrella
-meshes of 84 to 150 cells, one of them on supports, share 8 cells. Nine grids, among them one of
-strongly varying curvature, one of asymptotic lines held at its boundary and one of geodesics, share
-8 + 5 parts. Four released umbrella meshes share 8 cells (read from beside the repository, left out
-where they aren't). The search is asked for its quick effort: one start a set. Every table has the
-inputs and the baselines beside the kit: see the study `direct_vs_relaxed`. Deviations are distances
-of the joints from the target surface, in % of its size.
+Ten C-shells, conformal images of a square, share 8 linear and 5 angular parts, as the ten of Becker
+et al. (2024) do. So do ten of which only five are such images: the others are a fan, a hexagon, a
+ring, a skew net and a triangle. Five umbrella meshes of 84 to 150 cells, one of them on supports,
+share 8 cells. Nine grids, among them one of strongly varying curvature, one of asymptotic lines
+held at its boundary and one of geodesics, share 8 + 5 parts. Four released umbrella meshes share 8
+cells (read from beside the repository, left out where they aren't). Every table has the inputs and
+the baselines beside the kit: see the study `direct_vs_relaxed`. Deviations are distances of the
+joints from the target surface, in % of its size.
 """
 
 from __future__ import annotations

@@ -89,7 +89,7 @@ def data_sets(models: Path, released: Path, quick: bool = False) -> list[KitCase
         hand
     quick : one design each and hardly any steps
     """
-    stages = QUICK_STAGES if quick else StageSettings(effort="quick")
+    stages = QUICK_STAGES if quick else StageSettings()
     count = 1 if quick else None
     shells = [
         *select_files(models / "conformals", count or 5),
@@ -99,11 +99,14 @@ def data_sets(models: Path, released: Path, quick: bool = False) -> list[KitCase
         *select_files(models / "grids", count),
         *([] if quick else select_files(models / "grids_hard")),
     ]
+    beams = {"linear": 8, "angular": 5}
     large = select_files(models / "umbrellas" if quick else models / "umbrellas_large", count)
+    conformal = select_files(models / "conformals", count)
     cases = [
-        KitCase("ten C-shells", shells, {"linear": 8, "angular": 5}, stages),
+        *([] if quick else [KitCase("ten conformal C-shells", conformal, beams, stages)]),
+        KitCase("ten C-shells of all outlines", shells, beams, stages),
         KitCase("large umbrella meshes", large, {"cell": 8}, stages),
-        KitCase("nine grids", grids, {"linear": 8, "angular": 5}, stages),
+        KitCase("nine grids", grids, beams, stages),
     ]
     published = [released / f"{name}.json.gz" for name in RELEASED]
     if not quick and all(file.is_file() for file in published):
