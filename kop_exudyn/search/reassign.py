@@ -19,11 +19,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from ..compiled.library import address, library
 from ..kit.kinds import part_kind
 from ..kit.parts import Assignment, Kit
 from ..kit.reuse import PieceCount
 from ..sqp.qp import QP, QPOptions, QPSolver
+from .descent import Descent
 from .evaluation import DesignDerivatives
 from .problems import AssignedProblem
 from .sliding import Counting, descend_in_boxes
@@ -218,7 +218,7 @@ def _sweep(
         n_ways = len(ways.names)
         choice = parts[number] * n_ways + variants[number]
         left = np.full(len(candidates), plenty) if spare is None else spare[number]
-        state = (
+        elements = Descent(
             q[n],
             slopes[n],
             model.hessians[n],
@@ -229,186 +229,17 @@ def _sweep(
             n_ways,
         )
         if counting is not None and spare is None:
-            changes += _descend_counted(*state, counting, model.piece_cost)
+            changes += elements.descend_counted(counting, model.piece_cost)
         else:
-            changes += _descend(*state, left)
-        while spare is not None and _exchange(*state):
-            changes += 1 + _descend(*state, left)
+            changes += elements.descend(left)
+        while spare is not None and elements.exchange():
+            changes += 1 + elements.descend(left)
         parts[number], variants[number] = choice // n_ways, choice % n_ways
     if not changes:
         return None, np.concatenate(q)
     return Assignment(
         problem.assignment.groups, tuple(parts), tuple(variants), problem.assignment.n_q
     ), np.concatenate(q)
-
-
-def _descend(
-    q: np.ndarray,
-    slope: np.ndarray,
-    hessian: np.ndarray,
-    indices: np.ndarray,
-    candidates: np.ndarray,
-    choice: np.ndarray,
-    least: float,
-    n_ways: int,
-    left: np.ndarray,
-) -> int:
-    """Coordinate descent over one group of elements until none gains; q, slope, choice and left are
-    brought up to date. Returns how many changes there were.
-
-    least : gain that counts; without one, two elements might swap forever
-    n_ways : candidates of one part, which follow each other
-    left : (m,) int64, pieces of each part that may still be taken
-    """
-    kernels = library()
-    if kernels is None:
-        return _descend_numpy(q, slope, hessian, indices, candidates, choice, least, n_ways, left)
-    hessian, indices = np.ascontiguousarray(hessian), np.ascontiguousarray(indices, np.int64)
-    candidates = np.ascontiguousarray(candidates, float)
-    elements, k, n = *indices.shape, len(q)
-    if indices.size and not (indices.min() >= 0 and indices.max() < n):
-        raise ValueError(f"elements name parameters that don't exist (there are {n})")
-    return kernels.descend(
-        elements,
-        k,
-        len(candidates),
-        n,
-        address(q),
-        address(slope, np.float64, (n,)),
-        address(hessian, np.float64, (n, n)),
-        address(indices, np.int64),
-        address(candidates, np.float64, (len(candidates), k)),
-        address(choice, np.int64, (elements,)),
-        least,
-        n_ways,
-        address(left, np.int64),
-    )
-
-
-def _descend_numpy(
-    q: np.ndarray,
-    slope: np.ndarray,
-    hessian: np.ndarray,
-    indices: np.ndarray,
-    candidates: np.ndarray,
-    choice: np.ndarray,
-    least: float,
-    n_ways: int,
-    left: np.ndarray,
-) -> int:
-    """`_descend` where there are no compiled kernels."""
-
-    def prices(mine: int) -> np.ndarray:
-        return np.where((left <= 0) & (np.arange(len(left)) != mine), np.inf, 0.0)
-
-    def moved(mine: int, other: int) -> None:
-        left[mine] += 1
-        left[other] -= 1
-
-    state = (q, slope, hessian, indices, candidates, choice, least, n_ways)
-    return _descend_priced(*state, prices, moved)
-
-
-def _descend_counted(
-    q: np.ndarray,
-    slope: np.ndarray,
-    hessian: np.ndarray,
-    indices: np.ndarray,
-    candidates: np.ndarray,
-    choice: np.ndarray,
-    least: float,
-    n_ways: int,
-    counting: Counting,
-    cost: float,
-) -> int:
-    """As `_descend` without a stock, where each piece that has to be made costs; the count of
-    pieces is brought up to date as well."""
-
-    def prices(mine: int) -> np.ndarray:
-        return cost * counting.changes(mine)
-
-    state = (q, slope, hessian, indices, candidates, choice, least, n_ways)
-    return _descend_priced(*state, prices, counting.move)
-
-
-def _descend_priced(
-    q: np.ndarray,
-    slope: np.ndarray,
-    hessian: np.ndarray,
-    indices: np.ndarray,
-    candidates: np.ndarray,
-    choice: np.ndarray,
-    least: float,
-    n_ways: int,
-    prices: Callable[[int], np.ndarray],
-    moved: Callable[[int, int], None],
-) -> int:
-    """Coordinate descent, see `_descend`.
-
-    prices : an element's part -> (m,) what each part costs besides, infinite where there is none
-    moved : is told every change, from which part to which
-    """
-    total, changed = 0, 1
-    while changed:
-        changed = 0
-        for e, own in enumerate(indices):
-            mine = int(choice[e]) // n_ways
-            d = candidates - q[own]
-            gains = d @ slope[own] + 0.5 * np.einsum("ci,ij,cj->c", d, hessian[np.ix_(own, own)], d)
-            gains += np.repeat(prices(mine), n_ways)
-            which = int(np.argmin(gains))
-            if gains[which] < -least and which != choice[e]:
-                slope += d[which] @ hessian[own]
-                q[own] = candidates[which]
-                moved(mine, which // n_ways)
-                choice[e] = which
-                changed += 1
-        total += changed
-    return total
-
-
-def _exchange(
-    q: np.ndarray,
-    slope: np.ndarray,
-    hessian: np.ndarray,
-    indices: np.ndarray,
-    candidates: np.ndarray,
-    choice: np.ndarray,
-    least: float,
-    n_ways: int,
-) -> int:
-    """Let elements of one group exchange their parts (in any variants) with the partner by which
-    most is gained, each once; how many did. The rest as in `_descend`."""
-    changed = 0
-    ways = np.arange(n_ways)
-    for e, own in enumerate(indices):
-        mine, theirs = choice[e] // n_ways, choice // n_ways
-        others = np.flatnonzero(theirs != mine)
-        if not len(others):
-            continue
-        at = indices[others]
-        # what the element would be by each partner's part, and each partner by the element's
-        d = candidates[theirs[others, None] * n_ways + ways] - q[own]
-        d_other = candidates[mine * n_ways + ways][None] - q[at][:, None]
-        alone = d @ slope[own] + 0.5 * np.einsum("ova,ab,ovb->ov", d, hessian[np.ix_(own, own)], d)
-        blocks = hessian[at[:, :, None], at[:, None, :]]
-        partner = np.einsum("ova,oa->ov", d_other, slope[at])
-        partner += 0.5 * np.einsum("ova,oab,ovb->ov", d_other, blocks, d_other)
-        coupling = np.einsum("ova,aob,owb->ovw", d, hessian[own][:, at], d_other)
-        gains = alone[:, :, None] + partner[:, None, :] + coupling
-        best = int(gains.argmin())
-        if gains.flat[best] >= -least:
-            continue
-        o, v, w = np.unravel_index(best, gains.shape)
-        f = int(others[o])
-        for index, step in ((own, d[o, v]), (indices[f], d_other[o, w])):
-            slope += step @ hessian[index]
-            q[index] += step
-        choice[e], choice[f] = choice[f] // n_ways * n_ways + v, mine * n_ways + w
-        for number in (e, f):  # exactly, not but for rounding
-            q[indices[number]] = candidates[choice[number]]
-        changed += 1
-    return changed
 
 
 def best_parts(

@@ -12,7 +12,7 @@ from kop_exudyn.kit.kinds import part_kind
 from kop_exudyn.kit.reuse import PieceCount
 from kop_exudyn.kit.stock import Stock
 from kop_exudyn.search import assigned as rounds
-from kop_exudyn.search import reassign as reassigning
+from kop_exudyn.search import descent
 from kop_exudyn.search.assigned import assigned_stage
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.opening import opened_stage
@@ -107,7 +107,7 @@ def test_a_stock_is_kept_to_and_used(stages, direct, derivatives, monkeypatch):
         assert found.changes > 0 and found.predicted.sum() < 0
         for kind, used in found.assignment.pieces(found.kit).items():
             assert np.all(used <= counts[kind]) or not together
-        monkeypatch.setattr(reassigning, "library", lambda: None)
+        monkeypatch.setattr(descent, "library", lambda: None)
         again = reassign(problem, model, move_parts=keep_parts)
         assert again.assignment.changes(found.assignment) == 0
         monkeypatch.undo()
