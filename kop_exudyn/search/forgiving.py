@@ -13,6 +13,7 @@ from dataclasses import replace
 
 from .assigned import further_rounds
 from .events import SQPLabel
+from .minding import minded, provable
 from .remaking import NEAR, made_otherwise
 from .stage_results import StageResult, all_same
 from .stages import Stages
@@ -101,7 +102,7 @@ def proven(stages: Stages, result: StageResult) -> StageResult:
         return replace(result, snapping=()) if result.snapping else result
     names = [stages.dataset.designs[n].name for n in lost]
     log.info("in more sets of errors %s snap", ", ".join(names))
-    mended, still = made_otherwise(stages.proving(), result, lost)
+    mended, still = made_otherwise(stages, result, lost)
     return result if mended is result else replace(mended, snapping=still)
 
 
@@ -126,17 +127,25 @@ def secured_steps(
 ) -> StageResult:
     """Designs in the states that they open into, with the parts optimised once more in steps that
     keep every design on the branch along which it opens, and forgiving if it is that; as they were
-    where that gains nothing. Where the way on is blocked, rounds of reassignments follow."""
-    secured = stages.secured(forgiving=forgiving)
+    where that gains nothing, or can't be proved any more. Where the way on is blocked, rounds of
+    reassignments follow."""
     best = stages.secured().kept(best)
     if not stages.optimises or best.value is None:
         return best
-    found = secured.assigned(best, SQPLabel.of_round(next(numbers)))
-    if found.blocked:
-        found = further_rounds(secured, found, numbers)
-    opened = replace(found, designs=secured.redeployed(found))
-    same = found.value is not None and all_same(secured.dataset.designs, found, opened)
-    return replace(found, steps=best.steps + found.steps) if same else best
+
+    def steps(minding: Stages) -> StageResult:
+        secured = minding.secured(forgiving=forgiving)
+        found = secured.assigned(best, SQPLabel.of_round(next(numbers)))
+        return further_rounds(secured, found, numbers) if found.blocked else found
+
+    if forgiving:
+        tried = minded(stages, steps, provable(stages, best))
+        found, proved = tried.end, tried.proved
+    else:
+        found, proved = steps(stages), True
+    opened = replace(found, designs=stages.secured().redeployed(found))
+    same = found.value is not None and all_same(stages.dataset.designs, found, opened)
+    return replace(found, steps=best.steps + found.steps) if same and proved else best
 
 
 def value_of(result: StageResult) -> float:

@@ -10,12 +10,13 @@ and forgiving; so do the reassignments that follow where a design is still far o
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from .assigned import further_rounds
 from .evaluation import Evaluation
 from .events import SQPLabel
+from .minding import minded, provable
 from .remaking import made_better, made_otherwise
 from .stage_results import StageResult, all_same
 from .stages import Stages
@@ -24,7 +25,6 @@ log = logging.getLogger(__name__)
 
 _LOOKED_AT = 6  # results on the way, at most
 _MENDED = 1  # of these, the best ones: designs that snap are made otherwise
-_AGAIN = 2  # times that steps are taken once more, minding what made their end snap, at most
 _REMAKINGS = 3  # rounds in which designs that are far off are made of other parts, at most
 _FELT = 5.0  # times the level: where the largest deviation is beyond that, other parts are tried
 
@@ -58,13 +58,12 @@ def level(stages: Stages, result: StageResult, numbers: Iterator[int]) -> StageR
             start, label, settings.round_steps, settings.round_tolerance
         )
 
-    # what isn't proved now needn't be then
-    doubtful = {*result.snapping, *stages.unproved(before)}
-    members = [n for n in range(len(result.designs)) if n not in doubtful]
-    end, minding = _minding(stages, stepped, members, ends)
+    members = provable(stages, before)  # what isn't proved now needn't be then
+    first = minded(stages, stepped, members, ends)
+    end = first.end
     steps, felt = result.steps + end.steps, 100 * _FELT * share
     if worst(end.designs) > felt:
-        careful = levelled(minding.careful())
+        careful = levelled(first.stages.careful())
         last = further_rounds(careful, end, numbers, SQPLabel.of_levelling, ends)
         ends.append(last)
         for number in range(_REMAKINGS):
@@ -90,37 +89,6 @@ def level(stages: Stages, result: StageResult, numbers: Iterator[int]) -> StageR
             )
             return replace(found, steps=steps, jumps=result.jumps)
     return replace(result, steps=steps)
-
-
-def _minding(
-    stages: Stages,
-    run: Callable[[Stages], StageResult],
-    members: Sequence[int],
-    ends: list[StageResult],
-) -> tuple[StageResult, Stages]:
-    """Where steps lead to that mind the sets of errors that made designs snap where steps led to
-    before; and the stages that mind these.
-
-    Few sets are tried at each step, so that steps come to where just these are forgiven. More of
-    them would cost as much at every step; those that tell are few.
-
-    run : takes the steps
-    members : the designs that must not snap
-    ends : gets the results
-    """
-    for _ in range(_AGAIN):
-        end = run(stages)
-        ends.append(end)
-        weighed = stages.secured().weighed(end)  # where distances are measured depends on it
-        lost = stages.unproved(weighed, members)
-        if not lost:
-            return end, stages
-        names = [stages.dataset.designs[n].name for n in lost]
-        log.info("in more sets of errors %s snap: once more, minding these", ", ".join(names))
-        stages = stages.minding(weighed, lost)
-    end = run(stages)
-    ends.append(end)
-    return end, stages
 
 
 def _far(result: StageResult, felt: float) -> list[int]:
@@ -153,7 +121,7 @@ def proved(
     if lost := stages.unproved(found, members):
         if not mended:
             return None
-        found, still = made_otherwise(stages.proving(), found, lost)
+        found, still = made_otherwise(stages, found, lost)
         if still or not _better(stages, found, before):
             return None
     return replace(found, snapping=before.snapping)

@@ -64,7 +64,8 @@ def made_otherwise(
 def _forgiving(
     stages: Stages, result: StageResult, n: int, derivatives: _Derivatives, dear: bool
 ) -> StageResult | None:
-    """The result with a design made otherwise that forgives; None where none is found."""
+    """The result with a design made otherwise that forgives, in the sets of errors that prove it as
+    well if there is one; None where none is found."""
     rng = np.random.default_rng([stages.settings.seed, n])
     values = [stages.share(result, k) for k in range(len(result.designs))]
     most = values[n] + (NEAR - 1) * result.merit
@@ -73,12 +74,15 @@ def _forgiving(
     for tries in _OTHERWISE:
         for opened in _opened(stages, result, n, _ways(stages, result, n, derivatives, rng, tries)):
             value = stages.share(opened, n)
-            allowed = most if dear and last is None else usual
-            if value > allowed or n in stages.snapping_among(opened, [n]):
+            dearer = value > usual
+            if value > most or dearer and (not dear or last is not None):
                 continue
-            if value <= usual:
+            if n in stages.snapping_among(opened, [n]):
+                continue
+            if not dearer and not stages.unproved(opened, [n]):
                 return opened
-            last = opened
+            if last is None or stages.share(last, n) > usual >= value:
+                last = opened
     return last
 
 

@@ -77,6 +77,12 @@ class Starts:
     left: list[tuple[int, StageResult]]
     first: int
 
+    def fresh(self) -> Iterator[int]:
+        """Numbers of SQPs that have no name yet."""
+        numbers = count(self.first)
+        self.first += _NUMBERS
+        return numbers
+
 
 def assigned_from_starts(
     stages: Stages, built: StageResult, bases: Sequence[Sequence[Evaluation]]
@@ -141,7 +147,11 @@ def assigned_from_starts(
 
 
 def forgiving_from_starts(
-    stages: Stages, found: Starts, result: StageResult, before: StageResult | None
+    stages: Stages,
+    found: Starts,
+    result: StageResult,
+    before: StageResult | None,
+    sure: bool = False,
 ) -> StageResult:
     """A result whose designs keep to their shape whatever errors of the workshop do, from other
     starts than the best one where that ended in designs that snap, or in a far higher J so as to
@@ -155,29 +165,35 @@ def forgiving_from_starts(
     much, or nothing else forgives. In the end, `forgiving_stage` has its last resorts.
 
     result : of the best start, without these
+    sure : whether what isn't proved to forgive is given up for another start that is
     """
     dear = DEAR * found.best.merit
-    if not result.snapping and result.merit <= dear or not stages.rule.parts_move:
-        return result if not result.snapping else _resorted(stages, result, found.first, before)
-    tried, first = found.tried, found.first
+    lost = sorted({*result.snapping, *(stages.unproved(result) if sure else ())})
+    if not lost and result.merit <= dear:
+        return result
+    if not stages.rule.parts_move:
+        return result if not result.snapping else _resorted(stages, result, found.fresh(), before)
+    tried = found.tried
     optimised = {n for n, _ in found.others}
     kept = next(n for n, one in enumerate(tried) if one.kept)
-    same = _of_the_same_parts(stages, result, count(first))
-    if same is not None and same.merit <= dear:
-        return same
-    first += _NUMBERS
-    winners = [] if same is None else [(kept, same)]
+    winners: list[_Winner] = []
     put_off: list[tuple[StageResult, int, StageResult, Iterator[int]]] = []
 
-    def opened_from(n: int, end: StageResult, numbers: Iterator[int], there: StageResult) -> None:
-        seen = found.seen.get(n, ())
-        opened = opened_stage(stages, end, before, numbers, False, seen, there)
-        if opened.value is not None and not opened.snapping:
-            winners.append((n, opened))
+    def won_by(n: int, end: StageResult) -> None:
+        if end.value is not None and not end.snapping:
+            winners.append(_Winner(n, end, not sure or not stages.unproved(end)))
 
-    for n, start in [*found.others, *found.left[:1]] if winners else _candidates(found):
+    def opened_from(n: int, end: StageResult, numbers: Iterator[int], there: StageResult) -> None:
+        won_by(n, opened_stage(stages, end, before, numbers, False, found.seen.get(n, ()), there))
+
+    def enough() -> bool:
+        return any(won.proved and won.result.merit <= dear for won in winners)
+
+    won_by(kept, _of_the_same_parts(stages, result, lost, found.fresh()))
+    others = [*found.others, *found.left[:1]] if winners else _candidates(found)
+    for n, start in [] if enough() else others:
         log.info("trying start %d (%s) as well", n + 1, tried[n].origin)
-        numbers, first, end = count(first), first + _NUMBERS, start
+        numbers, end = found.fresh(), start
         if n not in optimised:
             seen = found.seen.setdefault(n, [])
             end = assigned_stage(stages, stages.confirmed(start), numbers, seen=seen)
@@ -192,35 +208,48 @@ def forgiving_from_starts(
             if n not in optimised:  # those of the others were looked at before
                 other = substitute(stages, found.best, found.seen[n])
                 if other is not None:
-                    winners.append((n, secured_steps(stages, other, numbers, forgiving=True)))
-        if any(won.merit <= dear for _, won in winners):
+                    won_by(n, secured_steps(stages, other, numbers, forgiving=True))
+        if enough():
             break
     for k, (there, n, end, own) in enumerate(sorted(put_off, key=lambda one: one[0].merit)):
-        if any(won.merit <= dear for _, won in winners) or (winners and k > 0):
+        if enough() or (winners and k > 0):
             break
         opened_from(n, end, own, there)
     if not winners:
-        return _resorted(stages, result, first, before)
-    which, won = min(winners, key=lambda pair: pair[1].merit)
-    if won is result:
+        return _resorted(stages, result, found.fresh(), before)
+    best = min(winners, key=lambda won: (not won.proved, won.result.merit))
+    if best.result is result:
         return result
-    tried[:] = [replace(one, kept=k == which) for k, one in enumerate(tried)]
-    log.info("start %d forgives, at J = %s, from %s", which + 1, won.value, result.value)
-    return replace(won, steps=result.steps + won.steps, jumps=result.jumps)
+    tried[:] = [replace(one, kept=k == best.start) for k, one in enumerate(tried)]
+    log.info(
+        "start %d forgives, at J = %s, from %s", best.start + 1, best.result.value, result.value
+    )
+    steps = result.steps + best.result.steps
+    return replace(best.result, steps=steps, jumps=result.jumps)
+
+
+@dataclass(frozen=True)
+class _Winner:
+    """A result that forgives, the number of its start, and whether that is as sure as is asked
+    for."""
+
+    start: int
+    result: StageResult
+    proved: bool
 
 
 def _of_the_same_parts(
-    stages: Stages, result: StageResult, numbers: Iterator[int]
-) -> StageResult | None:
-    """A result that forgives, its designs that snap made of the same parts otherwise and the parts
-    optimised from there; None where that doesn't help."""
-    if not result.snapping:
+    stages: Stages, result: StageResult, lost: Sequence[int], numbers: Iterator[int]
+) -> StageResult:
+    """The result with designs that snap made of the same parts otherwise and the parts optimised
+    from there; as it was where that doesn't help."""
+    if not lost:
         return result
-    mended, still = made_otherwise(stages, result, result.snapping, dear=True)
+    mended, still = made_otherwise(stages, result, lost, dear=True)
     if still:
-        return None
+        return result
     won = secured_steps(stages, mended, numbers, forgiving=True)
-    return replace(won, snapping=(), jumps=result.jumps)
+    return replace(won, snapping=(), steps=won.steps - result.steps)
 
 
 def _candidates(found: Starts) -> list[tuple[int, StageResult]]:
@@ -229,10 +258,10 @@ def _candidates(found: Starts) -> list[tuple[int, StageResult]]:
 
 
 def _resorted(
-    stages: Stages, result: StageResult, first: int, before: StageResult | None
+    stages: Stages, result: StageResult, numbers: Iterator[int], before: StageResult | None
 ) -> StageResult:
     """What the last resorts make of a result with designs that snap."""
-    resorted = forgiving_stage(stages, result, (), count(first), before)
+    resorted = forgiving_stage(stages, result, (), numbers, before)
     return replace(resorted, jumps=result.jumps)
 
 

@@ -191,7 +191,7 @@ def test_a_kit_that_snaps_in_more_sets_is_made_otherwise(found, monkeypatch):
     monkeypatch.setattr(forgiving, "made_otherwise", otherwise)
     monkeypatch.setattr(Stages, "snapping_among", lambda self, result, members: (1,))
     assert forgiving.proven(stages, after) is after
-    assert asked == [(stages.required.seed + 1, (1,))]
+    assert asked == [(stages.required.seed, (1,))]
     # one that snapped already is tried again, with the others
     known = replace(after, snapping=(1,))
     assert forgiving.proven(stages, known) is known and len(asked) == 2
@@ -215,11 +215,11 @@ def test_a_result_is_proved_and_then_levelled(found, monkeypatch):
 
     monkeypatch.setattr(run, "level", levelled)
     monkeypatch.setattr(run, "proven", proven)
-    assert run._levelled(stages, start) is after
+    assert run._levelled(stages, start, count(1)) is after
     assert calls == [("proven", start), ("level", after)]
     after.snapping = (0,)
     try:
-        assert run._levelled(stages, start).snapping == ()
+        assert run._levelled(stages, start, count(1)).snapping == ()
     finally:
         after.snapping = ()
     assert [what for what, _ in calls[2:]] == ["proven", "level", "proven"]
@@ -230,12 +230,12 @@ def test_a_baseline_that_meets_all_and_is_nearer_is_taken(found, monkeypatch):
     monkeypatch.setattr(run, "_own_level", lambda stages, result, numbers: result)
     assert worst(after.designs) < worst(start.designs)
     monkeypatch.setattr(Stages, "snapping_among", lambda self, result, members: ())
-    taken = run._levelled(stages, start, [after])
+    taken = run._levelled(stages, start, count(1), [after])
     assert worst(taken.designs) == pytest.approx(worst(stages.confirmed(after).designs), rel=1e-6)
     np.testing.assert_array_equal(taken.kit.vector, after.kit.vector)
     assert taken.steps == start.steps
-    assert run._levelled(stages, after, [start]) is after
+    assert run._levelled(stages, after, count(1), [start]) is after
     # one that snaps where the result doesn't, and can't be made otherwise, is no rival
     monkeypatch.setattr(Stages, "snapping_among", lambda self, result, members: (0,))
     monkeypatch.setattr(levelling, "made_otherwise", lambda stages, result, lost: (result, lost))
-    assert run._levelled(stages, start, [after]) is start
+    assert run._levelled(stages, start, count(1), [after]) is start

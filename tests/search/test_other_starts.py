@@ -19,9 +19,10 @@ def search(monkeypatch):
     on the way to it, and what comes of rounds from where it opens. Calls are noted."""
     calls = []
     outcomes = {}
+    unproved = outcomes.setdefault("unproved", [])
 
     def numbered():
-        return [outcome for number, outcome in outcomes.items() if number != "otherwise"]
+        return [outcome for number, outcome in outcomes.items() if isinstance(number, int)]
 
     def of(start):
         return next(outcome for outcome in numbered() if outcome["start"] is start)
@@ -47,7 +48,7 @@ def search(monkeypatch):
         calls.append(("resorts", given.value))
         return result(7.0)
 
-    def otherwise(stages, given, lost, dear):
+    def otherwise(stages, given, lost, dear=False):
         mended = outcomes.get("otherwise")
         return (given, lost) if mended is None else (mended, ())
 
@@ -62,6 +63,7 @@ def search(monkeypatch):
         required=SimpleNamespace(opening=True),
         confirmed=lambda one: one,
         opened_by_itself=lambda end: result(ended(end)["opens"]),
+        unproved=lambda one: (0,) if one.value in unproved else (),
     )
     return stages, outcomes, calls
 
@@ -136,6 +138,21 @@ def test_a_dear_result_is_bettered_by_one_more_start(search):
     given = found(outcomes, {1: (1.0, 9.0, result(1.3), result(1.4, (0,)))})
     assert forgiving_from_starts(stages, given, dear, None) is dear
     assert given.tried[0].kept
+
+
+def test_what_is_proved_comes_first(search):
+    """A result that more errors make snap is gone on from only where nothing else is found."""
+    stages, outcomes, calls = search
+    outcomes["unproved"] += [1.0, 1.01]
+    given = found(outcomes, {1: (1.0, 1.0, None, result(1.02))})
+    assert forgiving_from_starts(stages, given, result(1.0), None, sure=True).value == 1.02
+    assert given.tried[1].kept
+    given = found(outcomes, {1: (1.0, 1.0, None, result(1.01))})
+    kept = result(1.0)
+    assert forgiving_from_starts(stages, given, kept, None, sure=True) is kept
+    assert given.tried[0].kept
+    calls.clear()  # where it needn't be sure, nothing is asked
+    assert forgiving_from_starts(stages, given, kept, None) is kept and not calls
 
 
 def test_where_no_start_forgives_there_are_last_resorts(search):
