@@ -93,8 +93,7 @@ def forgiving_stage(
 
 def proven(stages: Stages, result: StageResult) -> StageResult:
     """A result that forgives, tried with more sets of errors; designs that snap in one of them are
-    made of the same parts otherwise, where that helps and costs little: what is one set in many to
-    the workshop isn't worth a shape that is far off."""
+    made of the same parts otherwise, where that helps."""
     if result.value is None:
         return result
     lost = stages.unproved(result)
@@ -102,7 +101,7 @@ def proven(stages: Stages, result: StageResult) -> StageResult:
         return replace(result, snapping=()) if result.snapping else result
     names = [stages.dataset.designs[n].name for n in lost]
     log.info("in more sets of errors %s snap", ", ".join(names))
-    mended, still = made_otherwise(stages, result, lost)
+    mended, still = made_otherwise(stages, result, lost, dear=True)
     return result if mended is result else replace(mended, snapping=still)
 
 

@@ -34,6 +34,7 @@ log = logging.getLogger(__name__)
 
 # of the parts' sizes: where designs only open if steps are shorter than that, there is none
 _SHORTEST = 1e-5
+_TRIALS = 4  # of such a step, each a quarter as long as the last one, and each costs a few seconds
 _MORE = 4  # times the sets of errors, where more are asked for
 _AT_A_STEP = 100  # of them, of all designs together
 _PROOF_MARGIN = (
@@ -148,13 +149,15 @@ class Stages:
         point = problem.point(
             problem.variables(np.concatenate([e.q for e in evaluations])), evaluations
         )
+        secured = self.dataset.requirements.opening
         options = SQPOptions(
             hessian=self.settings.hessian,
             secant=True,
             max_steps=max_steps or self.settings.assigned_steps,
             decrease_tolerance=tolerance or self.settings.assigned_tolerance,
             penalty=self.dataset.penalty,
-            min_radius=_SHORTEST if self.dataset.requirements.opening else SQPOptions.min_radius,
+            min_radius=_SHORTEST if secured else SQPOptions.min_radius,
+            max_trials=_TRIALS if secured else SQPOptions.max_trials,
             qp=QPOptions(interior_point=len(problem.sliding) > 0),
         )
         result = minimise_kept(label, problem, point, options, self.store, self.observer)

@@ -184,7 +184,7 @@ def test_a_kit_that_snaps_in_more_sets_is_made_otherwise(found, monkeypatch):
     assert mended.merit <= 1.5 * after.merit
     asked = []
 
-    def otherwise(stages, result, lost):
+    def otherwise(stages, result, lost, dear):
         asked.append((stages.required.seed, tuple(lost)))
         return result, tuple(lost)
 
