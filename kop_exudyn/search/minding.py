@@ -11,14 +11,15 @@ from .stages import Stages
 
 log = logging.getLogger(__name__)
 
-_AGAIN = 2  # times that steps are taken once more, at most
+_AGAIN = 1  # times that steps are taken once more, at most
 
 
 @dataclass(frozen=True)
 class Minded:
     """Where steps led to.
 
-    end : the last result; stages : minding all sets of errors that made earlier ones snap
+    end : the first result that is proved to forgive, or the best one where none is
+    stages : minding all sets of errors that made results snap
     proved : whether it forgives
     """
 
@@ -43,18 +44,20 @@ def minded(
     members : the designs that must not snap
     seen : gets the results
     """
+    ends: list[StageResult] = []
     for again in range(_AGAIN + 1):
-        end = run(stages)
+        ends.append(run(stages))
         if seen is not None:
-            seen.append(end)
-        weighed = stages.secured().weighed(end)  # where distances are measured depends on it
-        lost = stages.unproved(weighed, members) if end.value is not None else ()
-        if not lost or again == _AGAIN:
-            break
-        names = [stages.dataset.designs[n].name for n in lost]
-        log.info("in more sets of errors %s snap: once more, minding these", ", ".join(names))
-        stages = stages.minding(weighed, lost)
-    return Minded(end, stages, not lost)
+            seen.append(ends[-1])
+        weighed = stages.secured().weighed(ends[-1])  # where distances are measured depends on it
+        lost = stages.unproved(weighed, members) if weighed.value is not None else ()
+        if not lost:
+            return Minded(ends[-1], stages, True)
+        if again < _AGAIN:
+            names = [stages.dataset.designs[n].name for n in lost]
+            log.info("in more sets of errors %s snap: once more, minding these", ", ".join(names))
+            stages = stages.minding(weighed, lost)
+    return Minded(min(ends, key=lambda end: end.merit), stages, False)
 
 
 def provable(stages: Stages, result: StageResult) -> list[int]:
