@@ -154,6 +154,27 @@ def test_a_design_that_snaps(sound, monkeypatch):
     assert "0.2" in stop.why and f"{1000 * usual / 8:.2g} mm" in stop.helps
 
 
+@pytest.mark.parametrize(
+    ("snapping", "asked", "possible"),
+    [((3,), [20, 100], True), ((3, 50), [20, 100], False), ((3, 4), [20], False), ((), [20], True)],
+)
+def test_one_set_of_twenty_is_told_by_a_hundred(sound, monkeypatch, snapping, asked, possible):
+    """At most one in a hundred may snap, which twenty don't tell."""
+    numbers = []
+
+    def sampled(design, evaluation, tolerance, number, seed=0, objective=None):
+        numbers.append(number)
+        return [Sample(np.zeros(1), None, 1.0, snapped=k in snapping) for k in range(number)]
+
+    for module in ("verdict", "mending"):
+        monkeypatch.setattr(f"kop_exudyn.analysis.{module}.sample_spread", sampled)
+    verdict = judge(*sound, sound[1], replace(FEW, samples=20))
+    assert verdict.possible == possible and numbers[: len(asked)] == asked
+    told = verdict.to_dict()["tolerance"]
+    assert told["samples"] == asked[-1]
+    assert told["snapped"] == sum(k < asked[-1] for k in snapping)
+
+
 def test_parts_that_cannot_be_cut(sound):
     objective, kept = sound
     verdict = judge(objective, kept, kept, FEW)
