@@ -139,12 +139,13 @@ def secured_steps(
 
     if forgiving:
         tried = minded(stages, steps, provable(stages, best))
-        found, proved = tried.end, tried.proved
+        found = tried.end
+        worth = tried.proved or DEAR * value_of(found) < value_of(best)
     else:
-        found, proved = steps(stages), True
+        found, worth = steps(stages), True
     opened = replace(found, designs=stages.secured().redeployed(found))
     same = found.value is not None and all_same(stages.dataset.designs, found, opened)
-    return replace(found, steps=best.steps + found.steps) if same and proved else best
+    return replace(found, steps=best.steps + found.steps) if same and worth else best
 
 
 def value_of(result: StageResult) -> float:

@@ -122,7 +122,7 @@ def proved(
         if not mended:
             return None
         found, still = made_otherwise(stages, found, lost)
-        if still or not _better(stages, found, before):
+        if still or stages.unproved(found, members) or not _better(stages, found, before):
             return None
     return replace(found, snapping=before.snapping)
 
