@@ -218,9 +218,11 @@ def _margins(verdicts: Sequence[Buildable], units: Units | None) -> str:
             f"{in_millimetres(worst.tolerance.length, units, 2)} and "
             f"{np.degrees(worst.tolerance.angle):.2g} degrees"
         )
+        snapped = sum(one.snapped for one in kept)
+        one_each = " (no design in more than one of a hundred)" if snapped else ""
         found.append(
-            f"{sum(one.snapped for one in kept)} of {sum(one.samples for one in kept)} samples "
-            f"with errors of {errors} snap"
+            f"{snapped} of {sum(one.samples for one in kept)} samples with errors of {errors} "
+            f"snap{one_each}"
         )
     if any(verdict.loads for verdict in verdicts):
         found.append("all load cases are carried")

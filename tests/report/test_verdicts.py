@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from html import unescape
 
 import pytest
@@ -68,6 +69,9 @@ def test_a_kit_that_can_be_built(judged):
     assert verdict.possible and lines[0] == "The design can be built from this kit."
     assert "0 of 3 samples with errors of 0.21 mm and 0.1 degrees snap" in lines[1]
     assert verdict.fabrication == () and verdict.moved_percent < 0.1
+    rare = replace(verdict.forgiveness, samples=100, snapped=1)
+    (_, told) = verdict_lines([replace(verdict, forgiveness=rare)], None)
+    assert "1 of 100 samples" in told and "(no design in more than one of a hundred)" in told
 
 
 def test_a_section_twice_too_thick(judged, data):
