@@ -112,7 +112,8 @@ def proved(
     than steps are tried with. None where there is none.
 
     members : the designs that this is asked of; default: those that don't snap before
-    mended : whether designs that do snap are made of the same parts otherwise
+    mended : whether designs that do snap are made of the same parts otherwise, which need forgive
+        no more than steps have to: whether an end is proved is asked once more of the whole search
     """
     if found.value is None or not _better(stages, found, before):
         return None
@@ -122,7 +123,7 @@ def proved(
         if not mended:
             return None
         found, still = made_otherwise(stages, found, lost)
-        if still or stages.unproved(found, members) or not _better(stages, found, before):
+        if still or not _better(stages, found, before):
             return None
     return replace(found, snapping=before.snapping)
 

@@ -167,8 +167,13 @@ def _forgives(
 
 
 def unforgiven(objective: DesignObjective, evaluation: Evaluation) -> list[np.ndarray]:
-    """Those of the required sets of errors (nq,) that make a design snap, see `forgives`."""
-    samples = _samples(objective, evaluation, _required_sets(objective), 0.0, placed=False)
+    """Those of the required sets of errors (nq,) that make a design snap, see `forgives`; all of
+    them where nothing can be predicted from its state."""
+    sets = _required_sets(objective)
+    try:
+        samples = list(_samples(objective, evaluation, sets, 0.0, placed=False))
+    except SimulationFailure:
+        return sets
     return [sample.errors for sample in samples if sample.lost]
 
 

@@ -159,6 +159,7 @@ def test_levelled_results_are_proved_with_more_errors(found, levelled, monkeypat
         return (0,) if self.required.margin > 1 else tuple(sure)
 
     monkeypatch.setattr(Stages, "snapping_among", snapping)
+    monkeypatch.setattr(levelling, "made_otherwise", lambda stages, result, lost: (result, lost))
     unproved = level(stages, after, count(1))
     assert (proving.required.samples, proving.required.margin) in asked and (100, 1.0) in asked
     placed = worst(stages.confirmed(after).designs)
