@@ -40,7 +40,7 @@ _AT_A_STEP = 100  # of them, of all designs together
 _PROOF_MARGIN = (
     1.25  # how much larger than a workshop's are the errors that prove a result, at most
 )
-_SURE = 100  # sets of errors as large as a workshop's, of which none may make a design snap
+_SURE = 10  # times the sets of errors, as large as a workshop's, of which none may make it snap
 
 
 class Stages:
@@ -293,11 +293,11 @@ class Stages:
 
     def sure(self) -> Stages:
         """The same stages with as many sets of errors as large as a workshop's, and other ones, as
-        tell a share of one in a hundred."""
+        tell a share of one in a hundred, where ten are tried at a step."""
         other = copy(self)
         other.required = replace(
             self.required,
-            samples=max(_SURE, self.required.samples) if self.required.samples else 0,
+            samples=_SURE * self.required.samples,
             margin=min(self.required.margin, 1.0),
             seed=self.required.seed + 2,
         )

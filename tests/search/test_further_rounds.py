@@ -161,7 +161,7 @@ def test_levelled_results_are_proved_with_more_errors(found, levelled, monkeypat
     monkeypatch.setattr(Stages, "snapping_among", snapping)
     monkeypatch.setattr(levelling, "made_otherwise", lambda stages, result, lost: (result, lost))
     unproved = level(stages, after, count(1))
-    assert (proving.required.samples, proving.required.margin) in asked and (100, 1.0) in asked
+    assert (proving.required.samples, proving.required.margin) in asked and sure_of(stages) in asked
     placed = worst(stages.confirmed(after).designs)
     assert worst(unproved.designs) > (1 - 1e-6) * placed and unproved.snapping == ()
     assert worst(better.designs) < 0.99 * placed
@@ -180,6 +180,10 @@ def test_levelled_results_are_proved_with_more_errors(found, levelled, monkeypat
     # and one set of the larger errors alone doesn't cost a design its shape
     won = level(stages, after, count(1))
     assert len(mended) == 1 and worst(won.designs) <= worst(better.designs)
+
+
+def sure_of(stages):
+    return 10 * stages.required.samples, 1.0
 
 
 def same_elements(one, other):
