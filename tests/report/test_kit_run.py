@@ -276,7 +276,7 @@ def test_a_stock_that_cannot_suffice(another_kit, tmp_path):
     assert "best of the parts that are there: " in str(caught.value)
     assert not (tmp_path / "no").exists()
     together = Stock(kit, counts, together=True)
-    with pytest.raises(InputError, match="1 angular pieces .* together.*; 6 linear pieces"):
+    with pytest.raises(InputError, match="1 angular piece .* together.*; 6 linear pieces"):
         optimize_kit(zigzags(), kit=together, settings=SETTINGS)
 
 

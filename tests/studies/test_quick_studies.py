@@ -76,12 +76,13 @@ def test_pieces_are_counted_under_both_weights(reports):
         assert 0 < row["pieces"] < 400 and row["J"] > 0
 
 
-def test_a_new_design_is_built_better_after_relaxation(reports):
-    """Or as well, where relaxation leaves every element nearest to the same part."""
+def test_a_new_design_is_built_better_after_exchanges(reports):
+    """Relaxation alone may lead to parts that are no better than the nearest ones, as the report
+    says; exchanges from there make up for it."""
     rows = data_of(reports, "project_new_design")["weights"]
     for row in rows:
         most = 1 + 1e-9  # the same state, found twice
-        assert row["reassigned J"] <= row["built J"] * most <= row["direct J"] * most**2
+        assert row["reassigned J"] <= min(row["built J"], row["direct J"]) * most
     # elements that may still move come nearer to the target than parts do, at every weight
     assert all(row["relaxed max %"] < row["direct max %"] for row in rows)
 
