@@ -126,8 +126,8 @@ def secured_steps(
 ) -> StageResult:
     """Designs in the states that they open into, with the parts optimised once more in steps that
     keep every design on the branch along which it opens, and forgiving if it is that; as they were
-    where that gains nothing, or can't be proved any more. Where the way on is blocked, rounds of
-    reassignments follow."""
+    where that gains nothing, or gains little that can't be proved any more. Where the way on is
+    blocked, rounds of reassignments follow."""
     best = stages.secured().kept(best)
     if not stages.optimises or best.value is None:
         return best

@@ -70,9 +70,9 @@ class DesignObjective:
             self._bounds = {name: bound for name, bound in bounds.items() if bound.known}
         self._way = design.way if requirements.opening else None
         # which of the required sets of errors made the design snap last, and of states that were
-        # tried lately whether they forgive, by elements and energy: see tolerance.py
+        # tried lately whether they forgive, by elements, energy and further sets: see tolerance.py
         self.last_snapped = 0
-        self.forgiven: dict[tuple[bytes, str, int], bool] = {}
+        self.forgiven: dict[tuple[bytes, str, bytes], bool] = {}
         self._loads = self._load_bounds() if requirements.loads else []
 
     def _load_bounds(self) -> list[LoadBound]:

@@ -161,15 +161,7 @@ def optimize_kit(
         rivals = [found[name] for name in ("direct", "unrelaxed") if name in found]
         numbers = count(1)
         levelled = _levelled(stages, forgiving, numbers, rivals)
-        if 0 < _doubtful(stages, levelled) < float("inf"):
-            tried, other = list(starts.tried), _surer(stages, starts, levelled, result.at_parts)
-            if other is not levelled:
-                other = _levelled(stages, other, numbers, rivals)
-                if _doubtful(stages, other) < _doubtful(stages, levelled):
-                    levelled = other
-                else:
-                    starts.tried[:] = tried
-        found["assigned"] = levelled
+        found["assigned"] = _surer(stages, starts, levelled, result.at_parts, numbers, rivals)
         result.tried = starts.tried
         result.seconds["search"] = perf_counter() - begin_search
         found.update({stage: _confirmed(stages, outcome) for stage, outcome in found.items()})
@@ -219,18 +211,29 @@ def _levelled(
 
 
 def _surer(
-    stages: Stages, starts: Starts, result: StageResult, before: StageResult | None
+    stages: Stages,
+    starts: Starts,
+    result: StageResult,
+    before: StageResult | None,
+    numbers: Iterator[int],
+    rivals: Sequence[StageResult],
 ) -> StageResult:
-    """What other starts lead to where designs of a result aren't proved to forgive; the same one
-    where nothing else is found."""
-    names = [stages.dataset.designs[n].name for n in stages.unproved(result)]
+    """What other starts lead to, levelled, where designs of a result aren't proved to forgive; the
+    same one where that leaves as many."""
+    lost = stages.unproved(result) if result.value is not None else ()
+    if not lost:
+        return result
+    names = [stages.dataset.designs[n].name for n in lost]
     log.info("in more sets of errors %s snap in the end: trying other starts", ", ".join(names))
-    return forgiving_from_starts(stages, starts, result, before, sure=True)
-
-
-def _doubtful(stages: Stages, result: StageResult) -> float:
-    """How many designs of a result aren't proved to forgive; infinite where one failed."""
-    return float("inf") if result.value is None else len(stages.unproved(result))
+    tried = list(starts.tried)
+    other = forgiving_from_starts(stages, starts, result, before, sure=True)
+    if other is result:
+        return result
+    other = _levelled(stages, other, numbers, rivals)
+    if other.value is not None and len(stages.unproved(other)) < len(lost):
+        return other
+    starts.tried[:] = tried
+    return result
 
 
 def _own_level(stages: Stages, result: StageResult, numbers: Iterator[int]) -> StageResult:

@@ -26,6 +26,7 @@ from .evaluation import Evaluation
 from .events import ASSIGNED, Observer, SQPLabel, Stage
 from .kit_rule import rule_of
 from .problems import AssignedProblem, RelaxedProblem
+from .requirements import Requirements
 from .settings import StageSettings
 from .stage_results import Jump, StageResult, find_jump, restrict
 from .weights import Weights
@@ -274,33 +275,38 @@ class Stages:
     def careful(self) -> Stages:
         """The same stages with more sets of errors that results, and steps that are to forgive, are
         tried with; not so many more where there are many designs, as each step tries all."""
-        other, samples = copy(self), self.required.samples
+        samples = self.required.samples
         most = max(samples, _AT_A_STEP // len(self.dataset.designs))
-        other.required = replace(self.required, samples=min(_MORE * samples, most))
-        return other
+        return self._demanding(replace(self.required, samples=min(_MORE * samples, most)))
 
     def proving(self) -> Stages:
         """The same stages with other and more sets of errors, to try results with: steps that keep
         to some sets come to where just these are forgiven."""
-        other = copy(self)
-        other.required = replace(
-            self.required,
-            samples=_MORE * self.required.samples,
-            margin=min(self.required.margin, _PROOF_MARGIN),
-            seed=self.required.seed + 1,
+        return self._demanding(
+            replace(
+                self.required,
+                samples=_MORE * self.required.samples,
+                margin=min(self.required.margin, _PROOF_MARGIN),
+                seed=self.required.seed + 1,
+            )
         )
-        return other
 
     def sure(self) -> Stages:
         """The same stages with as many sets of errors as large as a workshop's, and other ones, as
         tell a share of one in a hundred, where ten are tried at a step."""
-        other = copy(self)
-        other.required = replace(
-            self.required,
-            samples=_SURE * self.required.samples,
-            margin=min(self.required.margin, 1.0),
-            seed=self.required.seed + 2,
+        return self._demanding(
+            replace(
+                self.required,
+                samples=_SURE * self.required.samples,
+                margin=min(self.required.margin, 1.0),
+                seed=self.required.seed + 2,
+            )
         )
+
+    def _demanding(self, required: Requirements) -> Stages:
+        """The same stages with other requirements of their results; the dataset's are of steps."""
+        other = copy(self)
+        other.required = required
         return other
 
     def unproved(self, result: StageResult, among: Sequence[int] | None = None) -> tuple[int, ...]:

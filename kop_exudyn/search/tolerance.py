@@ -143,7 +143,8 @@ def forgives(
     besides : sets of errors (nq,) that are tried first
     """
     state = evaluation.equilibria[objective.design.fitted_role.name]
-    key = (evaluation.q.tobytes(), f"{state.elastic_energy:.6e}", len(besides))
+    also = b"".join(errors.tobytes() for errors in besides)
+    key = (evaluation.q.tobytes(), f"{state.elastic_energy:.6e}", also)
     if key in objective.forgiven:
         return objective.forgiven[key]
     told = _forgives(objective, evaluation, [*besides, *_required_sets(objective)])

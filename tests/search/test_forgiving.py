@@ -17,7 +17,7 @@ from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.settings import StageSettings
 from kop_exudyn.search.stages import Stages
-from kop_exudyn.search.tolerance import forgives, sample_spread, usual_tolerance
+from kop_exudyn.search.tolerance import forgives, sample_spread, unforgiven, usual_tolerance
 from kop_exudyn.search.weights import Weights
 
 # far larger errors than a workshop makes: this shell snaps with nothing less
@@ -117,6 +117,18 @@ def test_predictions_tell_what_leading_back_tells(found, monkeypatch):
     monkeypatch.setattr(tolerance, "snapped", lambda *call: False)
     samples = sample_spread(shell, careless, errors, 8, confirmed=0.0, objective=objective)
     assert not any(sample.snapped for sample in samples)
+
+
+def test_what_is_remembered_is_of_the_same_sets(found):
+    *_, objective = found
+    careless = found[1].designs[0]
+    own = DesignObjective(
+        objective.design, objective.weights, objective.reference, replace(GROSS, samples=0)
+    )
+    (snapping, *_) = unforgiven(objective, careless)
+    for _ in range(2):
+        assert forgives(own, careless, [0.0 * snapping])
+        assert not forgives(own, careless, [snapping])
 
 
 def test_own_tolerances_and_none(found):
