@@ -209,9 +209,9 @@ class System:
         )
 
     def multiply(self, v: np.ndarray) -> np.ndarray:
-        """K v with the assembled Hessian over the free unknowns."""
-        U = self._matrix
-        return U @ v + U.T @ v - self.values[self.sparsity.diagonal] * v
+        """K v with the assembled Hessian over the free unknowns; v (n_free,) or (n_free, k)."""
+        U, diagonal = self._matrix, self.values[self.sparsity.diagonal]
+        return U @ v + U.T @ v - (diagonal * v.T).T
 
     def increment(self, free: np.ndarray) -> np.ndarray:
         """An increment (n_dofs,) of all unknowns from one of the free ones."""

@@ -24,9 +24,10 @@ from ..equilibrium.newton import NewtonOptions, solve
 from ..equilibrium.sensitivities import Sensitivities
 from ..equilibrium.system import System
 from ..errors import SimulationFailure
+from ..scene.assembly import ENERGY, GRADIENT
 from ..scene.scene import Driven, Scene
 from .base import Design
-from .loading import held_scene, loaded_scene
+from .loading import acting_loads, held_scene, loaded_scene
 from .loads import LoadCase
 from .opening import SAME_STATE
 from .stress_bound import MOST_ROWS, NEAR, Rows, StressBound
@@ -44,12 +45,14 @@ class _Asked:
 
     factor : of the loads
     scene : under them
+    loads : the same scene with nothing but them: rods without stiffness, no other terms
     stress : bound on its stress, or None
     deflection : whether it is bounded
     """
 
     factor: float
     scene: Scene
+    loads: Scene
     stress: StressBound | None
     deflection: bool
 
@@ -85,7 +88,8 @@ class LoadBound:
             scene = loaded_scene(design, self._scene, unloaded, case, factor)
             bound = StressBound(design, scene, safety) if safety is not None else None
             strong = bound if bound is not None and bound.known and factor == case.factor else None
-            self._steps.append(_Asked(factor, scene, strong, bounded and factor == 1.0))
+            loads = _only_loads(design, self._scene, unloaded, case, factor)
+            self._steps.append(_Asked(factor, scene, loads, strong, bounded and factor == 1.0))
 
     @property
     def states(self) -> list[str]:
@@ -148,10 +152,56 @@ class LoadBound:
         places = sensitivities.rows(self._moved)
         return self._moves_derivatives(sensitivities, own, places, self._nodes)
 
+    def work(self, factor: float, unloaded: Equilibrium, loaded: Equilibrium) -> float:
+        """f.u, of a factor of the loads and of how far what they act on moves."""
+        system = self._loads(factor)
+        system.set_parameters(unloaded.q)
+        before = system.assemble(unloaded.state, ENERGY).potential
+        return before - system.assemble(loaded.state, ENERGY).potential
+
+    def work_adjoint(
+        self, sensitivities: Sensitivities, factor: float, loaded: Equilibrium
+    ) -> np.ndarray:
+        """(nq,) the derivative of `work` in the elements, by three adjoint solves; parameters as of
+        `moves_adjoint`."""
+        unloaded, system = sensitivities.equilibrium, self._loads(factor)
+        nq = len(unloaded.q)
+        system.set_parameters(unloaded.q)
+        kept = system.sparsity.kept
+        dofs = np.flatnonzero(kept >= 0)
+        pulls = []
+        for state in (unloaded.state, loaded.state):
+            system.assemble(state, GRADIENT)
+            pulls.append(system.gradient[kept[dofs]])
+        both = self._loaded_sensitivities(factor, loaded).adjoint(dofs, -pulls[1])
+        found = both[:nq] + sensitivities.adjoint(self._moved, both[nq:])
+        found += sensitivities.adjoint(dofs, pulls[0])
+        if (weight := system.scene.weight) is not None:
+            x0, x1 = (self._scene.node_poses(s.state)[0] for s in (unloaded, loaded))
+            mean = (x1 - x0)[self._scene.elements].mean(axis=1)
+            lengths, factors = self._scene.length_parameter, self._scene.length_factor
+            has = np.flatnonzero(lengths >= 0)
+            by_length = factors * np.einsum("ei,ei->e", weight, mean)
+            found += np.bincount(lengths[has], by_length[has], minlength=nq)[:nq]
+        return found
+
+    def stiffness_product(
+        self, sensitivities: Sensitivities, factor: float, loaded: Equilibrium
+    ) -> np.ndarray:
+        """(nq, nq) u_q^T K u_q, of the derivatives of all movements under the loads, and the
+        stiffness in the loaded state; parameters as of `moves_adjoint`."""
+        own = self._loaded_sensitivities(factor, loaded)
+        dofs = own.system.sparsity.free
+        places = sensitivities.rows(self._moved)
+        moved_q = _chained(own.full, places) - sensitivities.rows(dofs)
+        return moved_q.T @ own.system.multiply(moved_q)
+
+    def _of(self, factor: float) -> _Asked:
+        return next(one for one in self._steps if one.factor == factor)
+
     def _loaded_sensitivities(self, factor: float, loaded: Equilibrium) -> Sensitivities:
         """Of the state under a factor of the loads."""
-        asked = next(one for one in self._steps if one.factor == factor)
-        return Sensitivities(self._system(asked), loaded)
+        return Sensitivities(self._system(self._of(factor)), loaded)
 
     def _moves_derivatives(
         self, sensitivities: Sensitivities, own: Sensitivities, places: np.ndarray, nodes: Indices
@@ -237,10 +287,17 @@ class LoadBound:
 
     def _system(self, asked: _Asked) -> System:
         """The workspace of a loaded scene; each thread has its own."""
-        systems: dict[float, System] = self._own.__dict__.setdefault("systems", {})
-        if asked.factor not in systems:
-            systems[asked.factor] = System(asked.scene)
-        return systems[asked.factor]
+        return self._workspace("systems", asked.factor, asked.scene)
+
+    def _loads(self, factor: float) -> System:
+        """The workspace of the loads alone."""
+        return self._workspace("loads", factor, self._of(factor).loads)
+
+    def _workspace(self, kind: str, factor: float, scene: Scene) -> System:
+        systems: dict[float, System] = self._own.__dict__.setdefault(kind, {})
+        if factor not in systems:
+            systems[factor] = System(scene)
+        return systems[factor]
 
     @property
     def _places(self) -> np.ndarray:
@@ -258,6 +315,16 @@ class LoadBound:
     def _names(self, asked: _Asked) -> list[str]:
         found = [self._stress] if asked.stress is not None else []
         return found + ([self._deflection] if asked.deflection else [])
+
+
+def _only_loads(
+    design: Design, scene: Scene, unloaded: Equilibrium, case: LoadCase, factor: float
+) -> Scene:
+    """What a factor of the loads adds to the held scene, whose potential is theirs alone."""
+    bare = replace(scene, weight=None)
+    heavy, acting = acting_loads(design, bare, unloaded, case, factor)
+    soft = replace(heavy, stiffness=np.zeros_like(heavy.stiffness))
+    return soft.with_terms(*(term for terms in acting.values() for term in terms))
 
 
 def with_places(scene: Scene, dofs: np.ndarray) -> Scene:

@@ -94,7 +94,7 @@ def test_weights_by_name():
     assert weights.to_dict() == {"fit": 1e4, "energy": 0.1, "share": 0.1, "stress": 2.0}
     assert Weights.of(weights.to_dict()) == weights
     with pytest.raises(
-        InputError, match="weights = 'beauty'.*known: fit, energy, deflection, stress"
+        InputError, match="weights = 'beauty'.*known: fit, energy, compliance, deflection, stress"
     ):
         Weights.of({"beauty": 1.0})
     with pytest.raises(InputError, match=r"weights\.stress.*nan"):

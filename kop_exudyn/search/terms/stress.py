@@ -6,7 +6,7 @@ With N, M_t, M_y, M_z in the middle of a rod element, and y, z the section's far
     u = (N / A)^2 + (M_y z / I_y)^2 + (M_z y / I_z)^2 + 3 (M_t W / J)^2
 
 is between a third of and the whole of the square of the equivalent stress at a corner
-(analysis/strength.py has that one, exactly). The term is the p-mean of the stress over the rods'
+(structures/strength.py has that one, exactly). The term is the p-mean of the stress over the rods'
 length, squared, and over that of the input design:
 
     S / S0,  S = (sum_e L_e u_e^(p/2) / sum_e L_e)^(2/p)
