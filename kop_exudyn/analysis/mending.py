@@ -13,9 +13,9 @@ from ..errors import SimulationFailure
 from ..scene.scene import Scene
 from ..search.evaluation import Evaluation
 from ..search.objective import DesignObjective
-from ..search.stage_results import SAME_STATE
 from ..search.tolerance import Tolerance, sample_spread
 from ..structures.base import Design
+from ..structures.opening import SAME_STATE
 from ..structures.strength import beyond_limit, design_strength, materials_of, rod_strength
 from ..structures.thickness import board_of, keeping_limit
 from ..units import in_millimetres

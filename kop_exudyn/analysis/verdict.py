@@ -19,10 +19,10 @@ from ..errors import InputError, SimulationFailure
 from ..scene.scene import Scene
 from ..search.evaluation import Evaluation, distance
 from ..search.objective import DesignObjective
-from ..search.stage_results import SAME_STATE
 from ..search.tolerance import Tolerance, sample_spread, usual_tolerance
 from ..structures.base import Design
 from ..structures.loading import supports_of
+from ..structures.opening import SAME_STATE
 from .load_check import LoadCheck, check_load
 from .mending import Stop, about_loads, about_opening, about_stress, about_tolerance
 from .tolerance import predicted_spread

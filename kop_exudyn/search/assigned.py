@@ -11,10 +11,11 @@ from itertools import count
 import numpy as np
 
 from ..errors import SimulationFailure
+from ..structures.opening import SAME_STATE
 from .evaluation import DesignDerivatives, Evaluation, distance
 from .events import ASSIGNED, SQPLabel
 from .reassign import LocalModel, MoveParts, Reassignment, best_parts, keep_parts, reassign
-from .stage_results import SAME_STATE, StageResult, combined
+from .stage_results import StageResult, combined
 from .stages import Stages
 
 log = logging.getLogger(__name__)
@@ -225,7 +226,7 @@ def _kept(stages: Stages, best: StageResult, trial: StageResult) -> StageResult 
             for n, (a, b) in enumerate(zip(kept.evaluations, best.evaluations))
             if n not in lost and not np.array_equal(a.q, b.q)
         ]
-        lost += stages.snapping_among(kept, changed)
+        lost += stages.snapping(kept, changed)
     if not lost:
         return kept
     if not np.array_equal(trial.kit.vector, best.kit.vector):

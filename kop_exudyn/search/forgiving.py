@@ -11,6 +11,7 @@ import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from . import demands
 from .assigned import further_rounds
 from .events import SQPLabel
 from .minding import minded, provable
@@ -70,7 +71,7 @@ def forgiving_stage(
         return last_resorts and all(value_of(one) > dear for one in found)
 
     for factor in _CALMER if stages.optimises and more_to_try() else ():
-        calmer = stages.calmer(factor)
+        calmer = demands.calmer(stages, factor)
         trial = calmer.assigned(calmer.weighed(best), SQPLabel.of_round(next(numbers)))
         steps += trial.steps
         if stages.required.opening:
@@ -81,7 +82,7 @@ def forgiving_stage(
             found.append(secured_steps(stages, opened, numbers, forgiving=True))
             break
     if before is not None and more_to_try():
-        first = stages.secured().kept(before)
+        first = demands.secured(stages).kept(before)
         if first.value is not None and not stages.snapping(first):
             found.append(secured_steps(stages, first, numbers, forgiving=True))
     if not found:
@@ -96,7 +97,7 @@ def proven(stages: Stages, result: StageResult) -> StageResult:
     made of the same parts otherwise, where that helps."""
     if result.value is None:
         return result
-    lost = stages.unproved(result)
+    lost = demands.unproved(stages, result)
     if not lost:
         return replace(result, snapping=()) if result.snapping else result
     names = [stages.dataset.designs[n].name for n in lost]
@@ -113,7 +114,7 @@ def substitute(
     limit = NEAR * value_of(best)
     near = sorted((other for other in others if value_of(other) <= limit), key=value_of)
     for number, other in enumerate(near[:_LOOKED_AT]):
-        opened = stages.secured().kept(other)
+        opened = demands.secured(stages).kept(other)
         if value_of(opened) > limit or stages.snapping(opened):
             continue
         log.info("the result on the way number %d forgives, at J = %.5g", number, value_of(opened))
@@ -128,12 +129,12 @@ def secured_steps(
     keep every design on the branch along which it opens, and forgiving if it is that; as they were
     where that gains nothing, or gains little that can't be proved any more. Where the way on is
     blocked, rounds of reassignments follow."""
-    best = stages.secured().kept(best)
+    best = demands.secured(stages).kept(best)
     if not stages.optimises or best.value is None:
         return best
 
     def steps(minding: Stages) -> StageResult:
-        secured = minding.secured(forgiving=forgiving)
+        secured = demands.secured(minding, forgiving=forgiving)
         found = secured.assigned(best, SQPLabel.of_round(next(numbers)))
         return further_rounds(secured, found, numbers) if found.blocked else found
 
@@ -143,7 +144,7 @@ def secured_steps(
         worth = tried.proved or DEAR * value_of(found) < value_of(best)
     else:
         found, worth = steps(stages), True
-    opened = replace(found, designs=stages.secured().redeployed(found))
+    opened = replace(found, designs=demands.secured(stages).redeployed(found))
     same = found.value is not None and all_same(stages.dataset.designs, found, opened)
     return replace(found, steps=best.steps + found.steps) if same and worth else best
 

@@ -13,6 +13,7 @@ import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from . import demands
 from .assigned import further_rounds
 from .evaluation import Evaluation
 from .events import SQPLabel
@@ -43,14 +44,18 @@ def level(stages: Stages, result: StageResult, numbers: Iterator[int]) -> StageR
     if not share or not stages.optimises or result.value is None:
         return result
     before = stages.confirmed(result)  # and placed best
-    settings, secured = stages.settings, stages.secured(forgiving=True, but=result.snapping)
-    start = secured.levelled(share).kept(secured.levelled(share).weighed(result))
+    settings = stages.settings
+    secured = demands.secured(stages, forgiving=True, but=result.snapping)
+
+    def levelled(minding: Stages) -> Stages:
+        return demands.levelled(
+            demands.secured(minding, forgiving=True, but=result.snapping), share
+        )
+
+    start = levelled(stages).kept(levelled(stages).weighed(result))
     if start.value is None:
         return result
     ends: list[StageResult] = []
-
-    def levelled(minding: Stages) -> Stages:
-        return minding.secured(forgiving=True, but=result.snapping).levelled(share)
 
     def stepped(minding: Stages) -> StageResult:
         label = SQPLabel.of_levelling(next(numbers))
@@ -63,7 +68,7 @@ def level(stages: Stages, result: StageResult, numbers: Iterator[int]) -> StageR
     end = first.end
     steps, felt = result.steps + end.steps, 100 * _FELT * share
     if worst(end.designs) > felt:
-        careful = levelled(first.stages.careful())
+        careful = levelled(demands.careful(first.stages))
         last = further_rounds(careful, end, numbers, SQPLabel.of_levelling, ends)
         ends.append(last)
         for number in range(_REMAKINGS):
@@ -119,7 +124,7 @@ def proved(
         return None
     if members is None:
         members = [n for n in range(len(found.designs)) if n not in before.snapping]
-    if lost := stages.unproved(found, members):
+    if lost := demands.unproved(stages, found, members):
         if not mended:
             return None
         found, still = made_otherwise(stages, found, lost)

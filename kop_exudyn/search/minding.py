@@ -6,6 +6,7 @@ import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from . import demands
 from .stage_results import StageResult
 from .stages import Stages
 
@@ -49,18 +50,20 @@ def minded(
         ends.append(run(stages))
         if seen is not None:
             seen.append(ends[-1])
-        weighed = stages.secured().weighed(ends[-1])  # where distances are measured depends on it
-        lost = stages.unproved(weighed, members) if weighed.value is not None else ()
+        weighed = demands.secured(stages).weighed(
+            ends[-1]
+        )  # where distances are measured depends on it
+        lost = demands.unproved(stages, weighed, members) if weighed.value is not None else ()
         if not lost:
             return Minded(ends[-1], stages, True)
         if again < _AGAIN:
             names = [stages.dataset.designs[n].name for n in lost]
             log.info("in more sets of errors %s snap: once more, minding these", ", ".join(names))
-            stages = stages.minding(weighed, lost)
+            stages = demands.minding(stages, weighed, lost)
     return Minded(min(ends, key=lambda end: end.merit), stages, False)
 
 
 def provable(stages: Stages, result: StageResult) -> list[int]:
     """The designs of a result that are proved to forgive: steps from there must not lose that."""
-    doubtful = {*result.snapping, *stages.unproved(result)}
+    doubtful = {*result.snapping, *demands.unproved(stages, result)}
     return [n for n in range(len(result.designs)) if n not in doubtful]

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from . import demands
 from .evaluation import DesignDerivatives, Evaluation
 from .reassign import LocalModel, Reassignment, improved, keep_parts
 from .shaking import shaken
@@ -77,9 +78,9 @@ def _forgiving(
             dearer = value > usual
             if value > most or dearer and (not dear or last is not None):
                 continue
-            if n in stages.snapping_among(opened, [n]):
+            if n in stages.snapping(opened, [n]):
                 continue
-            if not dearer and not stages.unproved(opened, [n]):
+            if not dearer and not demands.unproved(stages, opened, [n]):
                 return opened
             if last is None or stages.share(last, n) > usual >= value:
                 last = opened
@@ -104,7 +105,7 @@ def made_better(stages: Stages, result: StageResult, far: Sequence[int], seed: i
         ways = _ways(stages, result, n, derivatives, rng, _BETTER)
         for opened in _opened(stages, result, n, ways, _OPENED, limit):
             value = stages.share(opened, n)
-            if value <= limit and n not in stages.snapping_among(opened, [n]):
+            if value <= limit and n not in stages.snapping(opened, [n]):
                 log.info(
                     "%s made of other parts: %.5g, from %.5g",
                     stages.dataset.designs[n].name,
@@ -199,6 +200,6 @@ def _opened(
     led.sort(key=lambda trial: stages.share(trial, n))
     for trial in led[:most]:
         chosen = [trial if k == n else result for k in range(len(result.designs))]
-        opened = stages.secured().kept(stages.judged(combined(chosen, stages.dataset)))
+        opened = demands.secured(stages).kept(stages.judged(combined(chosen, stages.dataset)))
         if opened.value is not None:
             yield opened

@@ -16,13 +16,14 @@ from ..kit.reuse import PieceCount
 from ..structures.base import Design
 from ..structures.deviation import fit_summary
 from ..structures.fitting import TargetFitting
+from ..structures.opening import SAME_STATE
 from ..structures.stacking import group_designs
 from ..structures.strength import strength_summary
 from ..units import Units, common_units
 from .evaluation import Evaluation, distance
 from .events import Stage, StageEvent, events_to_list
 from .objective import Reference
-from .stage_results import SAME_STATE, StageResult
+from .stage_results import StageResult
 from .starts import TriedStart
 
 INPUT = "input"  # the designs as given, before all stages

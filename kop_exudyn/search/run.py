@@ -29,6 +29,7 @@ from ..structures.stacking import (
 )
 from ..units import common_units, unit_of, unnamed_units
 from ..wording import counted
+from . import demands
 from .checkpoints import NoStore, Store
 from .dataset import Dataset
 from .evaluation import Evaluation
@@ -197,7 +198,7 @@ def _levelled(
     whole = [rival for rival in rivals if rival.value is not None]
     if found.value is None or not whole:
         return found
-    sure, secured = stages.confirmed(found), stages.secured()  # and placed best
+    sure, secured = stages.confirmed(found), demands.secured(stages)  # and placed best
     for rival in whole:
         if worst(stages.confirmed(rival).designs) >= worst(sure.designs):
             continue
@@ -220,7 +221,7 @@ def _surer(
 ) -> StageResult:
     """What other starts lead to, levelled, where designs of a result aren't proved to forgive; the
     same one where that leaves as many."""
-    lost = stages.unproved(result) if result.value is not None else ()
+    lost = demands.unproved(stages, result) if result.value is not None else ()
     if not lost:
         return result
     names = [stages.dataset.designs[n].name for n in lost]
@@ -230,7 +231,7 @@ def _surer(
     if other is result:
         return result
     other = _levelled(stages, other, numbers, rivals)
-    if other.value is not None and len(stages.unproved(other)) < len(lost):
+    if other.value is not None and len(demands.unproved(stages, other)) < len(lost):
         return other
     starts.tried[:] = tried
     return result

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import SimulationFailure
 from ..kit.parts import Assignment, Kit
 from ..structures.base import Design
-from ..structures.opening import SAME_STATE  # noqa: F401
+from ..structures.opening import SAME_STATE
 from .dataset import Dataset
 from .evaluation import Evaluation, distance
 
@@ -133,3 +133,14 @@ def restrict(assignment: Assignment, dataset: Dataset, members: Sequence[int]) -
         tuple(assignment.variant[k] for k in rows),
         int(subset.offsets[-1]),
     )
+
+
+def realised(dataset: Dataset, kit: Kit, assignment: Assignment, free: np.ndarray) -> np.ndarray:
+    """(n_q,) every element its part, and the parameters of no element (k,) as given; those of
+    elements that slide in their parts as near to what is given as these allow.
+
+    free : (k,) values of `Dataset.free`
+    """
+    q = np.zeros(assignment.n_q)
+    q[dataset.free] = free
+    return assignment.realise(kit, q)

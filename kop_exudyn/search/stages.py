@@ -1,11 +1,9 @@
-"""The stages of finding a kit: direct, unrelaxed, relaxed and assigned, and what they demand of
-designs."""
+"""The stages of finding a kit: direct, unrelaxed, relaxed and assigned."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Mapping, Sequence
-from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +13,6 @@ from ..kit.kinds import part_kind
 from ..kit.part_costs import PartCosts
 from ..kit.parts import Assignment, Kit
 from ..kit.projection import Projection
-from ..kit.reuse import PieceCount
 from ..kit.stock import Stock
 from ..sqp.constraints import check_feasible
 from ..sqp.options import SQPOptions, SQPResult
@@ -24,28 +21,22 @@ from .checkpoints import NoStore, Store, minimise_kept
 from .dataset import Dataset, all_or_raise
 from .evaluation import Evaluation
 from .events import ASSIGNED, Observer, SQPLabel, Stage
+from .judge import Judge
 from .kit_rule import rule_of
 from .problems import AssignedProblem, RelaxedProblem
-from .requirements import Requirements
 from .settings import StageSettings
-from .stage_results import Jump, StageResult, find_jump, restrict
-from .weights import Weights
+from .stage_results import StageResult, find_jump, realised, restrict
 
 log = logging.getLogger(__name__)
 
 # of the parts' sizes: where designs only open if steps are shorter than that, there is none
 _SHORTEST = 1e-5
 _TRIALS = 4  # of such a step, each a quarter as long as the last one, and each costs a few seconds
-_MORE = 4  # times the sets of errors, where more are asked for
-_AT_A_STEP = 100  # of them, of all designs together
-_PROOF_MARGIN = (
-    1.25  # how much larger than a workshop's are the errors that prove a result, at most
-)
-_SURE = 10  # times the sets of errors, as large as a workshop's, of which none may make it snap
 
 
-class Stages:
-    """Runs the stages for one dataset; interrupted SQPs go on from the store's checkpoints.
+class Stages(Judge):
+    """Runs the stages for one dataset, and judges what they leave; interrupted SQPs go on from the
+    store's checkpoints.
 
     parts : kind -> number of parts of a kit that is sought, or a kit or a stock that is given
     """
@@ -62,16 +53,19 @@ class Stages:
         self.schedule = settings.schedule or tuple(
             k * (weights.fit or weights.energy) for k in (0.1, 1.0, 10.0, 100.0)
         )
-        # the search may pass through states that are led to; what it returns opens
-        self.required = settings.requirements
-        self.dataset = dataset.requiring(replace(self.required, opening=False, samples=0))
+        q0 = dataset.parameters
+        required = settings.requirements
+        super().__init__(
+            # the search may pass through states that are led to; what it returns opens
+            dataset.requiring(replace(required, opening=False, samples=0)),
+            required,
+            PartCosts.of(dataset.groups, q0, settings.slit_cost * (weights.fit or weights.energy)),
+            settings.reuse,
+        )
         self.settings = settings
         self.rule = rule_of(parts, dataset.group_designs)
         self.store, self.observer = store or NoStore(), observer or (lambda event: None)
-        self.q0 = dataset.parameters
-        self.costs = PartCosts.of(
-            dataset.groups, self.q0, settings.slit_cost * (weights.fit or weights.energy)
-        )
+        self.q0 = q0
         self.projection = Projection.of_inputs(
             dataset.groups,
             self.q0,
@@ -165,10 +159,17 @@ class Stages:
         designs = list(start.designs)
         for n, evaluation in zip(members, result.point.data.evaluations):
             designs[n] = evaluation
-        found = self._result(
-            designs, result.point.data.kit, start.assignment, result.steps, result.status
+        return self.judged(
+            StageResult(
+                designs,
+                result.point.data.kit,
+                start.assignment,
+                result.steps,
+                status=result.status,
+                pressure=_pressure(result),
+                blocked=_blocked(result),
+            )
         )
-        return replace(found, pressure=_pressure(result), blocked=_blocked(result))
 
     def assigned_problem(self, start: StageResult, members: Sequence[int]) -> AssignedProblem:
         """The problem over the parts, for some of the designs."""
@@ -198,200 +199,34 @@ class Stages:
         path_steps: int | None = None,
         watched: bool = True,
     ) -> StageResult:
-        """All designs followed from evaluations to the parts of another kit or assignment; not
-        confirmed yet.
+        """All designs followed from evaluations to the parts of another kit or assignment; one that
+        fails on the way is deployed there from scratch instead. Not confirmed yet.
 
         free : (k,) new values of the parameters of no element; default: they stay
         path_steps : default: the settings'
         watched : for snaps, in all these steps; else in as few of them as lead there
         """
-        designs, jumps = self._to_parts(start, kit, assignment, free, path_steps, watched)
-        return self._result(designs, kit, assignment, jumps=jumps)
-
-    def judged(self, result: StageResult) -> StageResult:
-        """The same result with the objective of its designs, and the cost of exceeded bounds."""
-        value, penalty = self._value(result.designs, result.kit)
-        return replace(
-            result,
-            value=value,
-            penalty=penalty,
-            reuse_factor=self._reuse_factor(result.kit, result.assignment),
-        )
-
-    def opened(self, result: StageResult) -> StageResult:
-        """The same result with every design in the state that it opens into by itself; not
-        confirmed yet.
-
-        A design for which no such state is found keeps the one it is in.
-        """
-        found = {
-            n: d for n, d in enumerate(result.designs) if isinstance(d, Evaluation) and not d.way
-        }
-        designs = list(result.designs)
-        for n, evaluation in self.dataset.open(found).items():
-            if isinstance(evaluation, SimulationFailure):
-                log.info("%s", evaluation)
-            else:
+        if free is None:
+            free = np.concatenate([e.q for e in start])[self.dataset.free]
+        q = realised(self.dataset, kit, assignment, free)
+        steps = path_steps or self.settings.path_steps
+        outcomes = self.dataset.follow(q, start, steps, watched)
+        designs: list[Evaluation | SimulationFailure] = []
+        jumps = []
+        for n, path in enumerate(outcomes):
+            if isinstance(path, SimulationFailure):
+                designs.append(path)
+                continue
+            jump = find_jump(
+                self.dataset.designs[n], start[n], path, self.dataset.references[n].target.size
+            )
+            jumps += [jump] if jump is not None else []
+            designs.append(path[-1])
+        failed = [n for n, d in enumerate(designs) if isinstance(d, SimulationFailure)]
+        for n, evaluation in self.dataset.redeploy(q, failed).items():
+            if isinstance(evaluation, Evaluation):
                 designs[n] = evaluation
-        return self.judged(replace(result, designs=designs))
-
-    def confirmed(self, result: StageResult) -> StageResult:
-        """The same result at Exudyn's own solutions; a design that Exudyn doesn't confirm becomes a
-        failure."""
-        found = {n: d for n, d in enumerate(result.designs) if isinstance(d, Evaluation)}
-        designs = list(result.designs)
-        for n, evaluation in self.dataset.confirm(found).items():
-            designs[n] = evaluation
-        return self.judged(replace(result, designs=designs))
-
-    def kept(self, result: StageResult) -> StageResult:
-        """A result that the search goes on from: opened where the stages are secured."""
-        return self.opened(result) if self.dataset.requirements.opening else result
-
-    def best_confirmed(self, *results: StageResult) -> StageResult:
-        """The first of these results whose designs Exudyn confirms; the first one, with its
-        failures, where there is none."""
-        found = [self.confirmed(results[0])]
-        for result in results[1:]:
-            if found[-1].value is not None:
-                break
-            found.append(self.confirmed(result))
-        return found[-1] if found[-1].value is not None else found[0]
-
-    def secured(self, forgiving: bool = False, but: Sequence[int] = ()) -> Stages:
-        """The same stages with designs kept on the branch along which they open: reassigned ones
-        are judged where they open into, and steps that leave the branch are refused.
-
-        forgiving : steps to where errors of the workshop make a design snap are refused as well
-        but : designs that may snap nevertheless, as they do already
-        """
-        other = copy(self)
-        samples = self.required.samples if forgiving else 0
-        exempt = frozenset(self.dataset.numbers[n] for n in but)
-        required = replace(self.required, samples=samples)
-        other.dataset = replace(self.dataset, requirements=required, exempt=exempt)
-        return other
-
-    def careful(self) -> Stages:
-        """The same stages with more sets of errors that results, and steps that are to forgive, are
-        tried with; not so many more where there are many designs, as each step tries all."""
-        samples = self.required.samples
-        most = max(samples, _AT_A_STEP // len(self.dataset.designs))
-        return self._demanding(replace(self.required, samples=min(_MORE * samples, most)))
-
-    def proving(self) -> Stages:
-        """The same stages with other and more sets of errors, to try results with: steps that keep
-        to some sets come to where just these are forgiven."""
-        return self._demanding(
-            replace(
-                self.required,
-                samples=_MORE * self.required.samples,
-                margin=min(self.required.margin, _PROOF_MARGIN),
-                seed=self.required.seed + 1,
-            )
-        )
-
-    def sure(self) -> Stages:
-        """The same stages with as many sets of errors as large as a workshop's, and other ones, as
-        tell a share of one in a hundred, where ten are tried at a step."""
-        return self._demanding(
-            replace(
-                self.required,
-                samples=_SURE * self.required.samples,
-                margin=min(self.required.margin, 1.0),
-                seed=self.required.seed + 2,
-            )
-        )
-
-    def _demanding(self, required: Requirements) -> Stages:
-        """The same stages with other requirements of their results; the dataset's are of steps."""
-        other = copy(self)
-        other.required = required
-        return other
-
-    def unproved(self, result: StageResult, among: Sequence[int] | None = None) -> tuple[int, ...]:
-        """The designs that other and more sets of errors than steps are tried with make snap.
-
-        Errors larger than a workshop's tell it in few sets. A design that one of them makes snap
-        isn't lost yet: more sets of the workshop's own errors have the last word.
-
-        among : default: all designs
-        """
-        designs = range(len(result.designs)) if among is None else among
-        return self.sure().snapping_among(result, self.proving().snapping_among(result, designs))
-
-    def minding(self, result: StageResult, members: Sequence[int]) -> Stages:
-        """The same stages with those sets of errors required besides that make some designs of a
-        result snap, of all those that prove it."""
-        other = copy(self)
-        minded = {number: list(sets) for number, sets in self.dataset.minded.items()}
-        designs = {n: d for n in members if isinstance(d := result.designs[n], Evaluation)}
-        for stages in (self.sure(), self.proving()):
-            found = self.dataset.requiring(stages.required).unforgiven(designs)
-            for n, sets in found.items():
-                minded.setdefault(self.dataset.numbers[n], []).extend(sets)
-        other.dataset = replace(self.dataset, minded=minded)
-        return other
-
-    def calmer(self, factor: float) -> Stages:
-        """The same stages with all terms but the fit weighing more: less stress and energy leave a
-        design fewer shapes to snap into."""
-        other = copy(self)
-        weights = self.dataset.weights
-        more = {name: factor * w for name, w in weights.of_terms().items() if name != "fit"}
-        other.dataset = replace(self.dataset, weights=Weights.of({**weights.to_dict(), **more}))
-        return other
-
-    def levelled(self, level: float) -> Stages:
-        """The same stages with deviations beyond a share of a design's size counting with their
-        fourth power."""
-        other = copy(self)
-        weights = replace(self.dataset.weights, level=level)
-        other.dataset = replace(self.dataset, weights=weights)
-        return other
-
-    def weighed(self, result: StageResult) -> StageResult:
-        """The same result judged by the weights of these stages; with the states on the way where
-        designs have to open by themselves."""
-        opening = self.dataset.requirements.opening
-        found = {
-            n: (d.q, dict(d.equilibria), d.way if opening else ())
-            for n, d in enumerate(result.designs)
-            if isinstance(d, Evaluation)
-        }
-        designs = list(result.designs)
-        for n, evaluation in self.dataset.judge(found).items():
-            designs[n] = evaluation
-        return self.confirmed(replace(result, designs=designs))
-
-    def snapping(self, result: StageResult) -> tuple[int, ...]:
-        """The designs of a result that errors of the workshop make snap, where it is required that
-        they don't."""
-        return self.snapping_among(result, range(len(result.designs)))
-
-    def snapping_among(self, result: StageResult, members: Sequence[int]) -> tuple[int, ...]:
-        """As `snapping`, of some of the designs."""
-        designs = {n: result.designs[n] for n in members}
-        found = {n: d for n, d in designs.items() if isinstance(d, Evaluation)}
-        return tuple(self.dataset.requiring(self.required).snapping(found))
-
-    def redeployed(self, result: StageResult) -> list[Evaluation | SimulationFailure]:
-        """Every design built of the result's parts and deployed from its own starting geometry,
-        with the states on its way there where designs have to open by themselves."""
-        places = [
-            d.q if isinstance(d, Evaluation) else design.parameters
-            for d, design in zip(result.designs, self.dataset.designs)
-        ]
-        q = self._realised(result.kit, result.assignment, np.concatenate(places)[self.dataset.free])
-        secured = self.secured().dataset
-        found = secured.redeploy(q, range(len(result.designs)))
-        opened = {n: at for n, at in found.items() if isinstance(at, Evaluation)}
-        found = {**found, **secured.confirm(opened)}
-        return [found[n] for n in range(len(result.designs))]
-
-    def opened_by_itself(self, result: StageResult) -> StageResult:
-        """The states that a result's designs open into from their assembly."""
-        return self.judged(replace(result, designs=self.redeployed(result)))
+        return self.judged(StageResult(designs, kit, assignment, jumps=jumps))
 
     # -- pieces --------------------------------------------------------------------------------
     def relaxed_at(
@@ -434,13 +269,6 @@ class Stages:
             self.observer,
         ), problem
 
-    def _realised(self, kit: Kit, assignment: Assignment, free: np.ndarray) -> np.ndarray:
-        """(n_q,) every element its part, and the parameters of no element (k,) as given; those of
-        elements that slide in their parts as near to what is given as these allow."""
-        q = np.zeros(assignment.n_q)
-        q[self.dataset.free] = free
-        return assignment.realise(kit, q)
-
     def limited(self, kit: Kit) -> Kit:
         """A kit that is sought, whose parts keep to their own limits; a given one as it is."""
         kinds = [name for name in kit.parts if part_kind(name).limits is not None]
@@ -448,93 +276,6 @@ class Stages:
             return kit
         limited = {name: part_kind(name).limited(kit[name]) for name in kinds}
         return Kit({**kit.parts, **limited}, kit.units)
-
-    def _to_parts(
-        self,
-        start: Sequence[Evaluation],
-        kit: Kit,
-        assignment: Assignment,
-        free: np.ndarray | None = None,
-        path_steps: int | None = None,
-        watched: bool = True,
-    ) -> tuple[list[Evaluation | SimulationFailure], list[Jump]]:
-        """Follow all designs to their parts; one that fails on the way is deployed there from
-        scratch instead."""
-        if free is None:
-            free = np.concatenate([e.q for e in start])[self.dataset.free]
-        q = self._realised(kit, assignment, free)
-        steps = path_steps or self.settings.path_steps
-        outcomes = self.dataset.follow(q, start, steps, watched)
-        designs: list[Evaluation | SimulationFailure] = []
-        jumps = []
-        for n, path in enumerate(outcomes):
-            if isinstance(path, SimulationFailure):
-                designs.append(path)
-                continue
-            jump = find_jump(
-                self.dataset.designs[n], start[n], path, self.dataset.references[n].target.size
-            )
-            jumps += [jump] if jump is not None else []
-            designs.append(path[-1])
-        failed = [n for n, d in enumerate(designs) if isinstance(d, SimulationFailure)]
-        for n, evaluation in self.dataset.redeploy(q, failed).items():
-            if isinstance(evaluation, Evaluation):
-                designs[n] = evaluation
-        return designs, jumps
-
-    def _result(
-        self,
-        designs: list[Evaluation | SimulationFailure],
-        kit: Kit,
-        assignment: Assignment,
-        steps: int = 0,
-        status: str = "",
-        jumps: Sequence[Jump] = (),
-    ) -> StageResult:
-        value, penalty = self._value(designs, kit)
-        return StageResult(
-            designs,
-            kit,
-            assignment,
-            steps,
-            value,
-            status,
-            list(jumps),
-            penalty=penalty,
-            reuse_factor=self._reuse_factor(kit, assignment),
-        )
-
-    def share(self, result: StageResult, n: int) -> float:
-        """Design n's share of what results are compared by; infinite where it failed."""
-        outcome = result.designs[n]
-        if not isinstance(outcome, Evaluation):
-            return np.inf
-        dataset = self.dataset
-        return dataset.design_weights[n] * outcome.value + dataset.penalty_of(outcome)
-
-    def piece_cost(self, result: StageResult) -> float:
-        """By how much J may rise for a piece less, see `StageSettings.reuse`."""
-        if not self.settings.reuse or result.value is None:
-            return 0.0
-        count = PieceCount(result.kit, result.assignment, self.dataset.group_designs)
-        return self.settings.reuse * (result.value + result.penalty) / count.fabricated
-
-    def _reuse_factor(self, kit: Kit, assignment: Assignment) -> float:
-        if not self.settings.reuse:
-            return 1.0
-        count = PieceCount(kit, assignment, self.dataset.group_designs)
-        return float((count.fabricated / count.elements) ** self.settings.reuse)
-
-    def _value(
-        self, designs: Sequence[Evaluation | SimulationFailure], kit: Kit
-    ) -> tuple[float | None, float]:
-        """The objective with what the parts cost, where no design failed, and the cost of exceeded
-        bounds."""
-        found = [design for design in designs if isinstance(design, Evaluation)]
-        if len(found) < len(designs):
-            return None, 0.0
-        value = self.dataset.value(found)
-        return value + self.costs.value(kit), self.dataset.merit(found) - value
 
 
 def _blocked(result: SQPResult) -> bool:

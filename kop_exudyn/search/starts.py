@@ -19,6 +19,7 @@ import numpy as np
 from ..kit.cluster import cluster
 from ..kit.parts import Assignment, Kit
 from .assigned import assigned_stage
+from .demands import unproved
 from .evaluation import Evaluation
 from .events import SQPLabel
 from .exchange import exchanged
@@ -168,7 +169,7 @@ def forgiving_from_starts(
     sure : whether what isn't proved to forgive is given up for another start that is
     """
     dear = DEAR * found.best.merit
-    lost = sorted({*result.snapping, *(stages.unproved(result) if sure else ())})
+    lost = sorted({*result.snapping, *(unproved(stages, result) if sure else ())})
     if not lost and result.merit <= dear:
         return result
     if not stages.rule.parts_move:
@@ -181,7 +182,7 @@ def forgiving_from_starts(
 
     def won_by(n: int, end: StageResult) -> None:
         if end.value is not None and not end.snapping:
-            winners.append(_Winner(n, end, not sure or not stages.unproved(end)))
+            winners.append(_Winner(n, end, not sure or not unproved(stages, end)))
 
     def opened_from(n: int, end: StageResult, numbers: Iterator[int], there: StageResult) -> None:
         won_by(n, opened_stage(stages, end, before, numbers, False, found.seen.get(n, ()), there))

@@ -8,7 +8,7 @@ import pytest
 
 from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.io.designs import load_design
-from kop_exudyn.search import remaking, tolerance
+from kop_exudyn.search import demands, remaking, tolerance
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.evaluation import distance
 from kop_exudyn.search.forgiving import forgiving_stage
@@ -34,9 +34,9 @@ def found(repository):
         pool.prepare()
         dataset = Dataset.of_pool(pool, Weights.suiting([shell]))
         stages = Stages(dataset, {"linear": 2, "angular": 1}, SETTINGS)
-        start = stages.secured().kept(stages.direct())
-        careless = stages.secured().assigned(start)
-        careful = stages.secured(forgiving=True).assigned(start)
+        start = demands.secured(stages).kept(stages.direct())
+        careless = demands.secured(stages).assigned(start)
+        careful = demands.secured(stages, forgiving=True).assigned(start)
         won = forgiving_stage(stages, careless, (), count(1), start)
         told = [stages.snapping(result) for result in (start, careless, careful, won)]
         fixed = replace_rule(stages)

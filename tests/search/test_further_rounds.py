@@ -8,7 +8,7 @@ import pytest
 from support.shells import stages_of_two
 
 from kop_exudyn.errors import SimulationFailure
-from kop_exudyn.search import assigned, forgiving, levelling, run
+from kop_exudyn.search import assigned, demands, forgiving, levelling, run
 from kop_exudyn.search.assigned import further_rounds
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.evaluation import distance
@@ -27,7 +27,7 @@ def found(repository):
     with what steps they took."""
     steps = []
     with stages_of_two(repository, SETTINGS, steps.append) as stages:
-        secured = stages.secured(forgiving=True)
+        secured = demands.secured(stages, forgiving=True)
         start = secured.assigned(secured.kept(secured.direct()))
         steps.clear()
         after = further_rounds(secured, start, count(7))
@@ -84,7 +84,7 @@ def test_a_design_that_is_lost_stays_as_it_was(found, monkeypatch):
         )
     )
     monkeypatch.setattr(
-        Stages, "snapping_among", lambda self, result, members: (1,) if 1 in members else ()
+        Stages, "snapping", lambda self, result, members=None: (1,) if 1 in members else ()
     )
     part = assigned._kept(secured, start, both)
     assert whole.merit < part.merit < start.merit
@@ -142,7 +142,7 @@ def test_levelling_tries_other_parts_where_a_deviation_is_felt(found, levelled, 
 def test_levelled_results_are_proved_with_more_errors(found, levelled, monkeypatch):
     """Of results on the way the best one that forgives these is taken, and none that doesn't."""
     stages, _, _, after, _ = found
-    proving = stages.proving()
+    proving = demands.proving(stages)
     assert proving.required.samples == 4 * stages.required.samples
     assert proving.required.margin < stages.required.margin
     assert proving.required.seed != stages.required.seed
@@ -150,7 +150,7 @@ def test_levelled_results_are_proved_with_more_errors(found, levelled, monkeypat
     assert better is not after and worst(better.designs) < worst(after.designs)
     asked, sure = [], [0]
 
-    def snapping(self, result, members):
+    def snapping(self, result, members=None):
         """Design 0 of what is found, in the larger errors that prove it, and as `sure` says in as
         many of the workshop's own as have the last word."""
         asked.append((self.required.samples, self.required.margin))
@@ -158,7 +158,7 @@ def test_levelled_results_are_proved_with_more_errors(found, levelled, monkeypat
             return ()
         return (0,) if self.required.margin > 1 else tuple(sure)
 
-    monkeypatch.setattr(Stages, "snapping_among", snapping)
+    monkeypatch.setattr(Stages, "snapping", snapping)
     monkeypatch.setattr(levelling, "made_otherwise", lambda stages, result, lost: (result, lost))
     unproved = level(stages, after, count(1))
     assert (proving.required.samples, proving.required.margin) in asked and sure_of(stages) in asked
@@ -201,13 +201,13 @@ def test_a_kit_that_snaps_in_more_sets_is_made_otherwise(found, monkeypatch):
         return result, tuple(lost)
 
     monkeypatch.setattr(forgiving, "made_otherwise", otherwise)
-    monkeypatch.setattr(Stages, "snapping_among", lambda self, result, members: (1,))
+    monkeypatch.setattr(Stages, "snapping", lambda self, result, members=None: (1,))
     assert forgiving.proven(stages, after) is after
     assert asked == [(stages.required.seed, (1,))]
     # one that snapped already is tried again, with the others
     known = replace(after, snapping=(1,))
     assert forgiving.proven(stages, known) is known and len(asked) == 2
-    monkeypatch.setattr(Stages, "snapping_among", lambda self, result, members: ())
+    monkeypatch.setattr(Stages, "snapping", lambda self, result, members=None: ())
     assert forgiving.proven(stages, after) is after and len(asked) == 2
     assert forgiving.proven(stages, known).snapping == ()
 
@@ -241,13 +241,13 @@ def test_a_baseline_that_meets_all_and_is_nearer_is_taken(found, monkeypatch):
     stages, _, start, after, _ = found
     monkeypatch.setattr(run, "_own_level", lambda stages, result, numbers: result)
     assert worst(after.designs) < worst(start.designs)
-    monkeypatch.setattr(Stages, "snapping_among", lambda self, result, members: ())
+    monkeypatch.setattr(Stages, "snapping", lambda self, result, members=None: ())
     taken = run._levelled(stages, start, count(1), [after])
     assert worst(taken.designs) == pytest.approx(worst(stages.confirmed(after).designs), rel=1e-6)
     np.testing.assert_array_equal(taken.kit.vector, after.kit.vector)
     assert taken.steps == start.steps
     assert run._levelled(stages, after, count(1), [start]) is after
     # one that snaps where the result doesn't, and can't be made otherwise, is no rival
-    monkeypatch.setattr(Stages, "snapping_among", lambda self, result, members: (0,))
+    monkeypatch.setattr(Stages, "snapping", lambda self, result, members=None: (0,))
     monkeypatch.setattr(levelling, "made_otherwise", lambda stages, result, lost: (result, lost))
     assert run._levelled(stages, start, count(1), [after]) is start

@@ -9,7 +9,7 @@ import pytest
 from support.shells import stages_of_two
 
 from kop_exudyn.errors import InputError
-from kop_exudyn.search import levelling
+from kop_exudyn.search import demands, levelling
 from kop_exudyn.search.evaluation import distance
 from kop_exudyn.search.events import SQPLabel
 from kop_exudyn.search.levelling import level, worst
@@ -27,7 +27,7 @@ def found(repository):
     took, and what came of it."""
     steps = []
     with stages_of_two(repository, SETTINGS, steps.append) as stages:
-        before = stages.secured().assigned(stages.secured().kept(stages.direct()))
+        before = demands.secured(stages).assigned(demands.secured(stages).kept(stages.direct()))
         assert not stages.snapping(before)
         steps.clear()
         with pytest.MonkeyPatch.context() as patch:  # the rounds after it: test_further_rounds.py

@@ -19,7 +19,7 @@ def search(monkeypatch):
     on the way to it, and what comes of rounds from where it opens. Calls are noted."""
     calls = []
     outcomes = {}
-    unproved = outcomes.setdefault("unproved", [])
+    lost = outcomes.setdefault("unproved", [])
 
     def numbered():
         return [outcome for number, outcome in outcomes.items() if isinstance(number, int)]
@@ -58,12 +58,12 @@ def search(monkeypatch):
     monkeypatch.setattr(starts, "substitute", substitute)
     monkeypatch.setattr(starts, "secured_steps", lambda stages, other, numbers, forgiving: other)
     monkeypatch.setattr(starts, "forgiving_stage", resorts)
+    monkeypatch.setattr(starts, "unproved", lambda stages, one: (0,) if one.value in lost else ())
     stages = SimpleNamespace(
         rule=SimpleNamespace(parts_move=True),
         required=SimpleNamespace(opening=True),
         confirmed=lambda one: one,
         opened_by_itself=lambda end: result(ended(end)["opens"]),
-        unproved=lambda one: (0,) if one.value in unproved else (),
     )
     return stages, outcomes, calls
 

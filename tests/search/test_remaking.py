@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.shells import stages_of_two
 
-from kop_exudyn.search import remaking
+from kop_exudyn.search import demands, remaking
 from kop_exudyn.search.remaking import made_better, made_otherwise
 from kop_exudyn.search.settings import StageSettings
 from kop_exudyn.search.stages import Stages
@@ -19,7 +19,7 @@ def found(repository):
     """Secured stages of two small shells, their direct projection, and the first one made
     better."""
     with stages_of_two(repository, SETTINGS, lambda event: None) as stages:
-        secured = stages.secured(forgiving=True)
+        secured = demands.secured(stages, forgiving=True)
         start = secured.kept(secured.direct())
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(remaking, "_BETTER", remaking._BETTER[:8])
@@ -41,7 +41,7 @@ def test_a_design_gains_and_the_others_stay(found):
 
 def test_what_is_better_opens_and_forgives(found):
     stages, _, better = found
-    assert better.designs[0].way and stages.snapping_among(better, [0]) == ()
+    assert better.designs[0].way and stages.snapping(better, [0]) == ()
 
 
 def test_the_same_seed_finds_the_same(found, monkeypatch):
@@ -54,7 +54,7 @@ def test_the_same_seed_finds_the_same(found, monkeypatch):
 def test_what_snaps_is_not_taken(found, monkeypatch):
     stages, start, _ = found
     monkeypatch.setattr(remaking, "_BETTER", remaking._BETTER[:2])
-    monkeypatch.setattr(Stages, "snapping_among", lambda self, result, members: tuple(members))
+    monkeypatch.setattr(Stages, "snapping", lambda self, result, members=None: tuple(members))
     assert made_better(stages, start, [0], 1) is start
     monkeypatch.setattr(remaking, "_OTHERWISE", (remaking._OTHERWISE[0][:2],))
     result, still = made_otherwise(stages, start, [0])
@@ -65,7 +65,7 @@ def test_a_dear_way_is_only_taken_where_that_is_allowed(found, monkeypatch):
     """Above half of what a design costs, or of the mean, more."""
     stages, start, _ = found
     monkeypatch.setattr(remaking, "_OTHERWISE", (remaking._OTHERWISE[0][:3],))
-    monkeypatch.setattr(Stages, "snapping_among", lambda self, result, members: ())
+    monkeypatch.setattr(Stages, "snapping", lambda self, result, members=None: ())
     share = Stages.share
 
     def dearer(self, result, n):
@@ -81,7 +81,7 @@ def test_a_dear_way_is_only_taken_where_that_is_allowed(found, monkeypatch):
 def test_designs_that_snap_already_are_not_asked(found):
     """The others are, by their own numbers, in subsets too."""
     stages, start, _ = found
-    but = stages.secured(forgiving=True, but=[0])
+    but = demands.secured(stages, forgiving=True, but=[0])
     asked = []
 
     class Pool:

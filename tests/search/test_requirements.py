@@ -5,6 +5,7 @@ import pytest
 
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.designs import load_design
+from kop_exudyn.search import demands
 from kop_exudyn.search.dataset import (
     Dataset,
     evaluations_from_arrays,
@@ -48,13 +49,13 @@ def run(shell):
         pool.prepare()
         dataset = Dataset.of_pool(pool, weights)
         plain = Stages(dataset, PARTS, StageSettings(requirements=Requirements()))
-        start = plain.secured().kept(plain.direct())
+        start = demands.secured(plain).kept(plain.direct())
         stressed = max(start.evaluations[0].utilisation.values())
         required = Requirements(safety=1.15 / stressed)
         store = Steps()
         stages = Stages(dataset, PARTS, StageSettings(requirements=required), store)
-        start = stages.secured().kept(stages.direct())
-        result = stages.secured().assigned(start)
+        start = demands.secured(stages).kept(stages.direct())
+        result = demands.secured(stages).assigned(start)
         led = Stages(dataset, PARTS, StageSettings(requirements=required)).assigned(start)
         places = [
             evaluations_from_arrays(
