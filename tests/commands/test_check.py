@@ -1,0 +1,31 @@
+"""`kop check`: designs and the sizes at which they share parts."""
+
+import pytest
+from support.commands import status_of
+
+
+def test_one_design_and_its_sizes(repository, tmp_path, capsys):
+    models = repository / "models" / "small"
+    arguments = ("check", models, "--designs", "2", "--parts", "linear=3,angular=2")
+    out = tmp_path / "out"
+    assert status_of(*arguments, "--harmonise", "0.9,1.1", "--out", out) == 0
+    text = capsys.readouterr().out
+    assert "2 designs, compared by a kit of 2 angular and 3 linear parts" in text
+    assert "small exp" in text and "opens; deviation max" in text and "sizes: small sinh 1," in text
+    assert sorted(path.name for path in out.iterdir()) == ["01_sinh.json", "03_exp.json"]
+
+
+@pytest.mark.parametrize(
+    "more, message",
+    [
+        (("--harmonise", "0.9,1.1"), "give it with --out"),
+        (("--out", "x"), "give it with --out"),
+        (("--harmonise", "1.1,1.2", "--out", "x"), "expected two factors"),
+        (("--parts", "linear=900"), "more parts than elements"),
+        (("--parts", "cell=2"), "no elements of this kind"),
+    ],
+)
+def test_what_makes_no_sense(more, message, repository, capsys):
+    models = repository / "models" / "small"
+    assert status_of("check", models, "--designs", "1", *more) == 2
+    assert message in capsys.readouterr().err
