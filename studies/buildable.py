@@ -8,11 +8,11 @@ find; that is how kits of parts have been sought so far. Here the same kits are 
 each time with one requirement more: nothing; the designs have to open from their assembly into the
 states that are shown; errors of the workshop must not make them snap; the equivalent stress has to
 keep below the elastic limit, in the assembly, deployed and on the way; and every design has to
-carry snow under which its input deflects by a 200th of its span, without deflecting more, and 1.5
-times that without yielding or giving way. C-shells weigh a little stress in all five. One start
-each, two leaps: what other starts find is not the question here. Deviations are distances of the
-joints from the target surface in % of its size, of the states that the designs open into: what a
-builder gets.
+carry snow without deflecting by more than a 200th of its span, and 1.5 times that without yielding
+or giving way. The snow is that under which the input would deflect by as much, if deflections grew
+as they do with small loads. C-shells weigh a little stress in all five. One start each, two leaps:
+what other starts find is not the question here. Deviations are distances of the joints from the
+target surface in % of its size, of the states that the designs open into: what a builder gets.
 """
 
 from __future__ import annotations

@@ -1,107 +1,176 @@
-"""Kit size against fidelity: five C-shells built from 2 to 25 linear parts.
+"""Kit size against fidelity: how many parts are enough.
 
     python studies/kit_size_tradeoff.py [--quick] [--out DIR] [--jobs N] [--scheduler ADDRESS]
     [--resume]
 
-How many parts are enough? Kits for conformals 1 to 5 are found with 5 angular and 25, 20, 16, 12,
-10, 8, 6, 4, 3 and 2 linear parts. The largest kit is found from scratch, in both stages; every
-other one starts from the next larger kit: the elements which that one realises are clustered into
-fewer parts, and the assigned stage optimises these and which part serves which element, in two
-rounds and without leaps, which keeps the sweep within half an hour. A kit that is worse than a
-smaller one is then sought again from that one.
+Kits of several sizes are found by what `kop tradeoff` calls, for conformals 1 to 5 (2 to 25 linear
+and 5 angular parts), six umbrella meshes (1 to 12 cells) and six grids (1 to 12 linear and 5
+angular parts). The largest kit is sought from scratch, in both stages; every other one by merging
+parts of the next larger one, in two rounds of exchanges and without leaps. A kit that is worse than
+a smaller one is sought again from that one. At some sizes the direct projection and the published
+method make what they can of as many parts.
 
-Deviations are distances of the joints from the target surfaces, in % of their
-sizes; every state is an equilibrium that Exudyn confirmed. Kit size counts pieces to make, as
-many of each part as the design that needs most of it, in % of the elements of all designs: 20 % at
-best for five designs. The knee is the point farthest below the straight line from the first to the
-last point, both axes scaled to [0, 1] (the rule of Satopaa et al., 2011), on the curve of the
-smallest largest deviation that at most so many parts give.
+Deviations are distances of the joints from the target surfaces, in % of their sizes, the larger of
+the state that is shown and of the one that the design opens into from its assembly; every state is
+an equilibrium that Exudyn confirmed. Kit size counts pieces to make, as many of each part as the
+design that needs most of it, in % of the elements of all designs: 20 % at best for five designs.
+The knee is the point farthest below the straight line from the first to the last point, both axes
+scaled to [0, 1] (the rule of Satopaa et al., 2011), on the curve of the smallest largest deviation
+that at most so many parts give.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from kop_exudyn.analysis.tradeoff import knee, tradeoff_row
+from matplotlib.figure import Figure
+
+from kop_exudyn.analysis.tradeoff import knee
+from kop_exudyn.drawing.style import PALETTE, style
 from kop_exudyn.report.tradeoff_drawing import draw_tradeoff
+from lib.size_kits import KeptKit, SizedCase, compared_tasks, kits_by_size, sized_cases
 from lib.study import Study
-from lib.study_tasks import shared_kits
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
+OTHERS = {"direct": "direct projection", "published": "published method"}
+MARKS = {"direct": ("x", "orange"), "published": ("+", "black")}
+
+
+@dataclass(frozen=True)
+class Found:
+    """What came out for one set of designs.
+
+    kits : the smallest first; rows : of the tables; at : number of the row at the knee, or None
+    """
+
+    case: SizedCase
+    kits: Sequence[KeptKit]
+    rows: Sequence[Mapping[str, Any]]
+    at: int | None
 
 
 def main() -> None:
     study = Study.from_command_line(__doc__, __file__)
+    cases = sized_cases(MODELS, study.quick)
+    found: list[Found] = []
+    for case in cases:  # the kits are kept in the folder of runs, the report after every set
+        kits = kits_by_size(study, case)
+        tasks = compared_tasks(study, case)
+        values = study.sweep(list(tasks.values()), jobs=1)
+        others = {size: values[task.name] for size, task in tasks.items()}
+        rows = [row_of(kit, others.get(kit.size, {})) for kit in kits]
+        at = knee([kit.size for kit in kits], [row["max %"] for row in rows])
+        found.append(Found(case, kits, rows, at))
+        write(study, found, [case.name for case in cases[len(found) :]])
 
-    # 1. Chains of kits, down from the largest and up from the smallest; each task runs its designs
-    # in parallel.
-    _, best = shared_kits(study, MODELS)
-    tasks = list(best.values())
-    kits = {task.name: study.results[task.name].value for task in tasks}
 
-    # 2. One row a kit, smallest first. A kit that couldn't be found at all has no row.
-    rows = [
-        tradeoff_row(task.settings["parts"], kits[task.name], study.results[task.name].seconds)
-        for task in tasks
-        if "failed" not in kits[task.name]
-    ]
-    sizes = [row["linear"] for row in rows]
-    at = knee(sizes, [row["max %"] for row in rows])
+def row_of(kit: KeptKit, others: Mapping[str, Any]) -> dict[str, Any]:
+    """Figures of one kit; of the other methods None where they weren't run or a design can't be
+    built."""
+    told = {name: value for name, value in kit.row.items() if name not in ("parts", "cost")}
+    result = kit.result
+    opens = [bool(result.redeployment(n).get("same_state")) for n in range(len(result.designs))]
+    return {
+        **told,
+        "open as shown": f"{sum(opens)} of {len(opens)}",
+        **{f"{name} max %": others.get(name) for name in OTHERS},
+    }
 
-    # 3. The report.
-    files = tasks[0].settings["files"]
-    first, last = rows[0], rows[-1]
-    finding = (
-        f"From {first['linear']} to {last['linear']} linear parts the largest deviation of "
-        f"{len(files)} designs "
-        f"goes from {shown(first['max %'])} to {shown(last['max %'])}, the kit from "
-        f"{first['kit size %']:.0f} "
-        f"to {last['kit size %']:.0f} % of the elements"
-    )
-    finding += (
-        "."
-        if at is None
-        else (
-            f"; the knee is at {sizes[at]} linear parts, with {shown(rows[at]['max %'])} "
-            f"and {rows[at]['kit size %']:.0f} %."
+
+def write(study: Study, found: Sequence[Found], missing: Sequence[str]) -> None:
+    """The report on the sets that have been done; missing : names of the others."""
+    outcome = " ".join(sentence(one) for one in found)
+    if missing:
+        outcome += f" Not run yet: {', '.join(missing)}."
+    report = study.report(outcome)
+    for one in found:
+        kind, name = one.case.kind, one.case.name.replace(" ", "_")
+        fixed = "".join(f" and {n} {other}" for other, n in one.case.others.items())
+        report.section(
+            one.case.name[0].upper() + one.case.name[1:],
+            f"{len(one.case.files)} designs of {one.case.sizes[0]} to {one.case.sizes[-1]} "
+            f"{kind}{fixed} parts.",
         )
-    )
-    report = study.report(finding)
-    report.figure(
-        "tradeoff",
-        draw_tradeoff(rows, "linear", at),
-        "Figures of every kit against its number of linear "
-        "parts; the dotted line marks the knee. Kits are optimised for all terms of the "
-        "objective, so one of "
-        "more parts may deviate more: grey is what at most so many parts give.",
-        alt="deviation, kit size, energy, time over linear parts",
-    )
-    report.table(
-        "kits",
-        rows,
-        "max and mean: of the joints' deviations; energy ratio: mean over the designs; J: the "
-        "objective; seconds: of the search that gave the kit; a dash: not all designs could be "
-        "built.",
-    )
+        report.figure(
+            f"tradeoff_{name}" if len(found) + len(missing) > 1 else "tradeoff",
+            drawn(one),
+            f"Figures of every kit against its number of {kind} parts"
+            + ("; the dotted line marks the knee." if one.at is not None else ".")
+            + " Kits are optimised for all terms of the objective, so one of more parts may "
+            "deviate more: grey is what at most so many parts give.",
+            alt=f"deviation, kit size, energy, time over {kind} parts",
+        )
+        report.table(
+            f"kits_{name}" if len(found) + len(missing) > 1 else "kits",
+            one.rows,
+            "max and mean: of the joints' deviations; energy ratio: mean over the designs; J: the "
+            "objective; from: the kit whose parts were split or merged; seconds: of the search "
+            "that gave the kit; direct and published: largest deviation of the designs as they "
+            "open; a dash: not run, or not all designs could be built.",
+        )
     designs = [
         {
-            "linear": task.settings["parts"]["linear"],
-            "design": design["name"],
-            "failed": design.get("failed"),
-            **design.get("fit", {}),
-            "energy ratio": design.get("energy_ratio"),
+            "of": one.case.name,
+            one.case.kind: kit.size,
+            "design": design.name,
+            **kit.result.summary("assigned", n).get("fit", {}),
         }
-        for task in tasks
-        for design in kits[task.name].get("designs", ())
+        for one in found
+        for kit in one.kits
+        for n, design in enumerate(kit.result.designs)
     ]
+    sets = {one.case.name: {"kits": one.rows, "knee": one.at} for one in found}
+    first = found[0]
+    at = None if first.at is None else first.kits[first.at].size
     report.save(
         {
-            "finding": finding,
-            "kits": rows,
+            "finding": outcome,
+            "kits": first.rows,
             "designs": designs,
-            "knee": None if at is None else sizes[at],
-        }
+            "knee": at,
+            "sets": sets,
+        },
+        settings={one.case.name: dict(one.kits[-1].result.settings) for one in found},
     )
+
+
+def sentence(one: Found) -> str:
+    """What the rows of one set say, beside the other methods at the same sizes."""
+    first, last, kind = one.rows[0], one.rows[-1], one.case.kind
+    text = (
+        f"{one.case.name[0].upper()}{one.case.name[1:]}: from {first[kind]} to {last[kind]} {kind} "
+        f"parts the largest deviation of {len(one.case.files)} designs goes from "
+        f"{shown(first['max %'])} to {shown(last['max %'])}, the kit from "
+        f"{first['kit size %']:.0f} to {last['kit size %']:.0f} % of the elements"
+    )
+    if one.at is not None:
+        row = one.rows[one.at]
+        text += f"; the knee is at {row[kind]}, with {shown(row['max %'])}"
+    for name, told in OTHERS.items():
+        both = [row for row in one.rows if row[kind] in one.case.compared]
+        values = ", ".join(f"{shown(row[f'{name} max %'])} of {row[kind]}" for row in both)
+        text += f"; the {told} ends at {values}"
+    return f"{text}."
+
+
+def drawn(one: Found) -> Figure:
+    """The four panels, with what the other methods make of as many parts in the first."""
+    figure = draw_tradeoff(one.rows, one.case.kind, one.at)
+    panel = figure.axes[0]
+    with style():
+        for name, told in OTHERS.items():
+            mark, colour = MARKS[name]
+            points = [(row[one.case.kind], row[f"{name} max %"]) for row in one.rows]
+            known = [point for point in points if point[1] is not None]
+            if known:
+                panel.plot(*zip(*known), mark, color=PALETTE[colour], label=told, markersize=7)
+        if len(panel.get_legend_handles_labels()[0]) > 3:
+            own = [*zip(*panel.get_legend_handles_labels())][3:]
+            panel.legend(*zip(*own), loc="upper right")
+    return figure
 
 
 def shown(percent: float | None) -> str:

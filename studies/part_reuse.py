@@ -8,8 +8,8 @@ designs shares.
 
 The reuse of a set of designs is the number of pieces that all of them use over the number that any
 of them uses; for two designs that is the Jaccard index of their multisets of pieces. The average is
-over all sets of two or more designs. Kits that the other study left in its folder are taken from
-there, missing ones are computed.
+over all sets of two or more designs. Kits that the other study left in the folder of runs are taken
+from there.
 
 Then a kit is sought with more and more weight on the pieces that have to be made so that the
 designs can be built one after the other (`StageSettings.reuse`).
@@ -26,8 +26,9 @@ from kop_exudyn.analysis.reuse import counts_of, jaccard_matrix, part_users, reu
 from kop_exudyn.io.datasets import select_files
 from lib.repeated import repeated_task
 from lib.reuse_drawing import draw_front, draw_reuse_over_size, draw_sharing, draw_subsets
+from lib.size_kits import kits_by_size, sized_cases
 from lib.study import Study
-from lib.study_tasks import QUICK, changed, shared_kits
+from lib.study_tasks import QUICK, changed
 from lib.sweep import Task
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
@@ -39,16 +40,12 @@ ALLOWED = 1.05  # of the deviation without a weight
 def main() -> None:
     study = Study.from_command_line(__doc__, __file__)
 
-    # 1. The kits, from the folder of the other study where it was run.
-    _, best = shared_kits(study, MODELS, [study.out.parent / "kit_size_tradeoff" / "sweep"])
-    kits = {
-        size: study.results[task.name].value
-        for size, task in best.items()
-        if study.results[task.name].failed is None
-    }
+    # 1. The kits, from the folder of runs where the study of sizes has left them.
+    case = sized_cases(MODELS, study.quick)[0]
+    kits = {kit.size: kit for kit in kits_by_size(study, case)}
 
     # 2. The figures of each, and the details of one.
-    found = {size: reuse_figures(kit["pieces"]) for size, kit in kits.items()}
+    found = {size: reuse_figures(kit.pieces()) for size, kit in kits.items()}
     rows = [
         {
             "linear": size,
@@ -64,13 +61,14 @@ def main() -> None:
     ]
     size = min(kits, key=lambda s: abs(s - SHOWN))
     kit, detail = kits[size], found[size]
-    names = [design["name"] for design in kit["designs"]]
+    pieces = kit.pieces()
+    names = [design.name for design in kit.result.designs]
     labels = [
         f"{kind[0].upper()}{k + 1}"
-        for kind in sorted(kit["pieces"][0])
-        for k in range(len(kit["kit"][kind]))
+        for kind in sorted(pieces[0])
+        for k in range(kit.result.kit.sizes[kind])
     ]
-    counts = counts_of(kit["pieces"])
+    counts = counts_of(pieces)
     pairs = [
         (detail["jaccard"][i][j], names[i], names[j]) for i in range(len(names)) for j in range(i)
     ]

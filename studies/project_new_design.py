@@ -25,8 +25,9 @@ import numpy as np
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.search.settings import StageSettings
 from lib.projection_drawing import draw_changes, draw_projection
+from lib.size_kits import kits_by_size, sized_cases
 from lib.study import Study
-from lib.study_tasks import QUICK, changed, project_task, shared_kits
+from lib.study_tasks import QUICK, changed, project_task
 from lib.sweep import Task
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
@@ -36,8 +37,8 @@ STATES = ("direct", "relaxed", "built", "reassigned")
 def main() -> None:
     study = Study.from_command_line(__doc__, __file__)
 
-    # 1. The kit, from the folder of the other study where that was run, and then one projection a
-    # weight.
+    # 1. The kit, from the folder of runs where the study of sizes has left it, and then one
+    # projection a weight.
     file = (
         MODELS / "small" / "06_moebius.json"
         if study.quick
@@ -47,18 +48,17 @@ def main() -> None:
         (3, (0.1, 10.0)) if study.quick else (12, tuple(10.0 ** (k / 2) for k in range(-4, 7)))
     )
     stages = changed(QUICK if study.quick else StageSettings())
-    other = study.out.parent / "kit_size_tradeoff" / "sweep"
-    kits, best = shared_kits(study, MODELS, [other])
+    case = sized_cases(MODELS, study.quick)[0]
+    kit = next(one for one in kits_by_size(study, case) if one.size == size)
     tasks = [
         Task(
             f"w_c {factor:.3g}",
             project_task,
-            {"file": file, "factor": factor, "stages": stages},
-            after=best[size].name,
+            {"file": file, "kit": kit.result.kit.to_dict(), "factor": factor, "stages": stages},
         )
         for factor in factors
     ]
-    found = study.sweep(kits + tasks, also=[other])
+    found = study.sweep(tasks)
 
     # 2. One row a weight; the best one.
     rows = [row_of(factor, found[task.name]) for factor, task in zip(factors, tasks)]

@@ -1,42 +1,11 @@
-"""Fidelity against the size of the kit: one row a kit, and the knee of the curve."""
+"""Fidelity against the size of the kit: what at most so many parts give, and the knee of that
+curve."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
-
-from .reuse import counts_of, fabricated, kit_size_percent
-
-
-def tradeoff_row(
-    parts: Mapping[str, int], found: Mapping[str, Any], seconds: float
-) -> dict[str, Any]:
-    """Figures of one kit, from what `find_kit` returned.
-
-    Deviations in % of the sizes: the largest of all designs, and the mean over
-    designs of their means; energy ratios: elastic energies relative to the input designs'. None
-    where a design failed.
-    """
-    counts = counts_of(found["pieces"])
-    built = [design for design in found["designs"] if "failed" not in design]
-    whole = len(built) == len(found["designs"])
-    fits = [design["fit"] for design in built]
-    ratios = [design["energy_ratio"] for design in built]
-    return {
-        **dict(parts),
-        "pieces": fabricated(counts),
-        "kit size %": kit_size_percent(counts),
-        "max %": max(fit["max_percent"] for fit in fits) if whole else None,
-        "mean %": float(np.mean([fit["mean_percent"] for fit in fits])) if whole else None,
-        "energy ratio": float(np.mean(ratios)) if whole else None,
-        "largest energy ratio": max(ratios) if whole else None,
-        "failed designs": len(found["designs"]) - len(built),
-        "J": found["objective"],
-        "equilibria": found["equilibria"],
-        "seconds": seconds,
-    }
 
 
 def envelope(values: Sequence[float | None]) -> np.ndarray:

@@ -18,7 +18,7 @@ Rows = Sequence[Mapping[str, Any]]
 
 
 def draw_tradeoff(rows: Rows, kind: str, knee: int | None = None) -> Figure:
-    """Four panels over the number of parts, from rows of `tradeoff_row` in the order of their
+    """Four panels over the number of parts, from rows of `SizedKit.row` in the order of their
     sizes; points of which several have one size aren't joined.
 
     kind : the column that has the numbers: a kind of parts, or "parts" for all together

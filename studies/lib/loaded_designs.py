@@ -10,6 +10,7 @@ import numpy as np
 
 from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.io.designs import load_design
+from kop_exudyn.io.rescaling import relocated
 from kop_exudyn.structures.base import Design
 from kop_exudyn.structures.loading import loaded_state
 from kop_exudyn.structures.loads import LoadCase
@@ -25,12 +26,13 @@ def with_snow(files: list[Path], folder: Path) -> Path:
     """Copies of design files in a folder, with a load case each; without one where the design is
     not held by its supports, or gives way.
 
-    Snow is a multiple of the design's own weight: that under which the design as given deflects by
-    its span over `SPAN_OVER`, as deflections grow with small loads.
+    Snow is a multiple of the design's own weight: that under which the design as given would
+    deflect by its span over `SPAN_OVER` if deflections grew as they do with small loads. Some
+    deflect a little more.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for file in files:
-        content = json.loads(file.read_text(encoding="utf-8"))
+        content = relocated(json.loads(file.read_text(encoding="utf-8")), file.parent, folder)
         times = _as_much_as_allowed(load_design(file))
         if times is not None:
             gravity = [0.0, 0.0, -times * _gravity(load_design(file))]

@@ -16,7 +16,7 @@ from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings
 from kop_exudyn.structures.base import Design
 
-from .kit_search import stages_of
+from .study_tasks import stages_of
 
 PERTURBATION = 1e-9  # relative, standard deviation
 
