@@ -231,7 +231,8 @@ def run(args: argparse.Namespace) -> int:
         inputs=study.files,
         resume=args.resume,
         settings=replace(
-            study.job_settings(designs, args.jobs or usable_cores()), published=args.published
+            study.job_settings(designs, args.jobs or usable_cores(), args.scheduler),
+            published=args.published,
         ),
         overwrite=args.overwrite,
         progress=not args.quiet,
@@ -318,7 +319,7 @@ def _smallest(args: argparse.Namespace, study: Study, parts: dict[str, int]) -> 
         {**first, **parts},
         out=args.out,
         cost=cost,
-        settings=study.job_settings(designs, args.jobs or usable_cores()),
+        settings=study.job_settings(designs, args.jobs or usable_cores(), args.scheduler),
         inputs=study.files,
         resume=args.resume,
         overwrite=args.overwrite,

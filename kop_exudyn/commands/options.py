@@ -45,12 +45,18 @@ def add_results(parser: argparse.ArgumentParser) -> None:
 
 
 def add_processes(parser: argparse.ArgumentParser) -> None:
-    """Add --jobs and --seed."""
+    """Add --jobs, --scheduler and --seed."""
     parser.add_argument(
         "--jobs",
         type=positive,
         metavar="N",
         help="processes that solve designs (default: one a core); the result doesn't depend on it",
+    )
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="of a running Dask scheduler, as tcp://127.0.0.1:8786, whose workers solve the "
+        "designs instead; the same result (needs the extra kop_exudyn[cluster])",
     )
     parser.add_argument(
         "--seed", type=not_negative, metavar="N", help="of the clustering (default: 0)"

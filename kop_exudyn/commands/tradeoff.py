@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
         sizes,
         out=args.out,
         cost=cost,
-        settings=study.job_settings(designs, args.jobs or usable_cores()),
+        settings=study.job_settings(designs, args.jobs or usable_cores(), args.scheduler),
         inputs=study.files,
         resume=args.resume,
         overwrite=args.overwrite,

@@ -55,12 +55,16 @@ class Study:
         """The designs; raises InputError as `load_designs`."""
         return load_all(self.files, self.source)
 
-    def job_settings(self, designs: Sequence[Design], jobs: int) -> JobSettings:
+    def job_settings(
+        self, designs: Sequence[Design], jobs: int, scheduler: str | None = None
+    ) -> JobSettings:
         """Settings of a job for these designs, which are the study's own, with that many
-        processes."""
+        processes, or the workers of a Dask scheduler."""
         weights = Weights.suiting(designs, self.weights) if self.weights else None
         counts = self.counts if set(self.counts) - {1.0} else None
-        return JobSettings(weights, counts, self.settings, jobs, self.baselines)
+        return JobSettings(
+            weights, counts, self.settings, jobs, self.baselines, scheduler=scheduler
+        )
 
 
 def load_study(path: str | Path, select: int | Sequence[str] | None = None) -> Study:

@@ -103,7 +103,7 @@ def optimize_and_report(
         result.given = [one.to_dict() for one in given]
         result.warnings = warning_lines(given)
         bar.set_description_str("verdicts")
-        verdicts = give_verdicts(result, verdict, settings.jobs)
+        verdicts = give_verdicts(result, verdict, settings.jobs, settings.scheduler)
     write_kit_report(result, folder.path, verdicts)
     return result
 

@@ -102,7 +102,7 @@ def smallest_and_report(
             _add_table(page, rows, figure)
 
         asked_of = VerdictSettings(safety=settings.stages.requirements.safety)
-        verdicts = give_verdicts(chosen.result, asked_of, settings.jobs)
+        verdicts = give_verdicts(chosen.result, asked_of, settings.jobs, settings.scheduler)
         write_kit_report(chosen.result, run.folder.path, verdicts, extend)
     return chosen, found is not None
 

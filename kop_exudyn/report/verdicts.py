@@ -24,16 +24,19 @@ _MOST_STOPS = 2  # of a design are named in its line
 
 
 def kit_verdicts(
-    result: KitResult, settings: VerdictSettings = VerdictSettings(), jobs: int = 1
+    result: KitResult,
+    settings: VerdictSettings = VerdictSettings(),
+    jobs: int = 1,
+    scheduler: str | None = None,
 ) -> list[Buildable]:
     """Whether each design of a result can be built from its kit.
 
     settings : tolerances, samples, safety
-    jobs : processes
+    jobs, scheduler : see `DesignPool`
     """
     kept, opened = result.stages["assigned"].designs, result.redeployed
     calls = {n: (kept[n], opened[n] if opened else None, settings) for n in range(len(kept))}
-    with DesignPool(result.designs, jobs) as pool:
+    with DesignPool(result.designs, jobs, scheduler) as pool:
         pool.references = list(result.references)
         found = pool.map(judge, Weights(), calls)
     verdicts = []
@@ -46,11 +49,14 @@ def kit_verdicts(
 
 
 def give_verdicts(
-    result: KitResult, settings: VerdictSettings = VerdictSettings(), jobs: int = 1
+    result: KitResult,
+    settings: VerdictSettings = VerdictSettings(),
+    jobs: int = 1,
+    scheduler: str | None = None,
 ) -> list[Buildable]:
     """The verdicts on a result's designs, which the result then tells as data and in words; see
     `kit_verdicts`."""
-    verdicts = kit_verdicts(result, settings, jobs)
+    verdicts = kit_verdicts(result, settings, jobs, scheduler)
     result.buildable = [one.to_dict() for one in verdicts]
     result.verdict = verdict_lines(verdicts, result.units)
     return verdicts

@@ -1,5 +1,5 @@
-"""Designs solved in parallel processes: each worker keeps its own workspaces, tasks carry only
-states."""
+"""Designs solved in parallel processes, of this machine or a cluster: each worker keeps its own
+workspaces, tasks carry only states."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 from ..errors import SimulationFailure
 from ..plugins import adopt, registered_elsewhere
 from ..structures.base import Design
+from .cluster import Cluster
 from .memory import peak_memory_mb
 from .objective import DesignObjective, Reference, reference_of
 from .requirements import Requirements
@@ -91,19 +92,26 @@ class DesignPool:
     designs : the designs, in the order of their numbers
     jobs : processes; 1 works in this process. Results don't depend on it: tasks carry all that they
         start from.
+    scheduler : address of a Dask scheduler, whose workers are used instead; see `Cluster`, also for
+        what is raised on entering
     """
 
-    def __init__(self, designs: Sequence[Design], jobs: int = 1):
+    def __init__(self, designs: Sequence[Design], jobs: int = 1, scheduler: str | None = None):
         self.designs, self.jobs = list(designs), max(1, min(jobs, len(designs)))
+        self.scheduler = scheduler
         self.references: list[Reference] = []
         self._parallel: Any = None  # joblib's Parallel, which is untyped
+        self._cluster: Cluster | None = None
         self._threads: threadpool_limits | None = None
         if self.jobs == 1:
             _initialise(self.designs)
 
     def __enter__(self) -> DesignPool:
+        if self.scheduler is not None:
+            extensions = registered_elsewhere()
+            self._cluster = Cluster(self.scheduler, _start_worker, (self.designs, extensions))
         self._threads = one_thread()
-        if self.jobs > 1:
+        if self._cluster is None and self.jobs > 1:
             self._start()
         return self
 
@@ -111,6 +119,9 @@ class DesignPool:
         if self._parallel is not None:
             self._parallel.__exit__(*exception)
             self._parallel = None
+        if self._cluster is not None:
+            self._cluster.close()
+            self._cluster = None
         if self._threads is not None:
             self._threads.restore_original_limits()
         _initialise([])
@@ -151,9 +162,15 @@ class DesignPool:
             from joblib import delayed
 
             found |= dict(self._parallel(delayed(_worker_memory)() for _ in range(4 * self.jobs)))
+        if self._cluster is not None:
+            return sum(found.values()) + sum(
+                mb for _, mb in self._cluster.everywhere(_worker_memory)
+            )
         return sum(found.values())
 
     def _run(self, tasks: Sequence[_Task]) -> list[Any]:
+        if self._cluster is not None:
+            return self._cluster.run(_run_task, tasks)
         if self._parallel is None or len(tasks) < 2:
             if not _designs:
                 _initialise(self.designs)

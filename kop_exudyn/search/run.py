@@ -31,6 +31,7 @@ from ..units import common_units, unit_of, unnamed_units
 from ..wording import counted
 from . import demands
 from .checkpoints import NoStore, Store
+from .cluster import check_cluster
 from .dataset import Dataset
 from .evaluation import Evaluation
 from .events import UNRELAXED, Observer, StageEvent
@@ -106,7 +107,7 @@ def optimize_kit(
         if observer is not None:
             observer(event)
 
-    with DesignPool(designs, settings.jobs) as pool:
+    with DesignPool(designs, settings.jobs, settings.scheduler) as pool:
         announce("input designs")
         pool.prepare()
         examine(pool)
@@ -266,9 +267,11 @@ def check_request(
 ) -> None:
     """Raise InputError for what can't be met whatever the simulations say: too many parts or none,
     a kit without a kind that a design is made of, bounds that exclude each other, constraints on
-    other parameters."""
+    other parameters, a cluster that can't be used."""
     if (parts is None) == (kit is None):
         raise InputError("give either numbers of parts or a kit", field="parts")
+    if settings.scheduler is not None:
+        check_cluster(settings.scheduler)
     units = common_units({design.name: design.units for design in designs})
     if kit is not None:
         given = kit.kit.units if isinstance(kit, Stock) else kit.units
@@ -297,7 +300,8 @@ def described_job(
     kit: Kit | Stock | None,
     settings: JobSettings,
 ) -> dict[str, Any]:
-    """All that the result depends on, as plain data; the number of processes is not part of it."""
+    """All that the result depends on, as plain data; the processes that work on it are not part of
+    it."""
     constraints = settings.stages.constraints
     values = asdict(replace(settings, stages=replace(settings.stages, constraints=None)))
     values["weights"] = settings.weights and settings.weights.to_dict()
@@ -306,7 +310,7 @@ def described_job(
         rows.sort_indices()
         numbers = (rows.indptr, rows.indices, rows.data, constraints.lower, constraints.upper)
         values["stages"]["constraints"] = {"rows": constraints.rows, "digest": digest(*numbers)}
-    del values["jobs"]
+    del values["jobs"], values["scheduler"]
     if not any(part_kind(name).penalty is not None for name in kinds_of(parts, kit)):
         del values["stages"]["slit_cost"]
     given: dict[str, Any] = {}

@@ -162,6 +162,7 @@ class JobSettings:
     design_weights : how much each design counts (default: all the same)
     stages : settings of the stages
     jobs : processes
+    scheduler : address of a Dask scheduler, whose workers are used instead of processes, or None
     baselines : also compute the unrelaxed baseline
     published : also find a kit by the published method, see published.py
 
@@ -174,6 +175,7 @@ class JobSettings:
     jobs: int = 2
     baselines: bool = True
     published: bool = False
+    scheduler: str | None = None
 
     def __post_init__(self) -> None:
         given = () if self.design_weights is None else self.design_weights

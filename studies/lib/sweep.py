@@ -22,6 +22,7 @@ from typing import Any, Protocol
 from kop_exudyn import __version__
 from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.provenance import code_digest
+from kop_exudyn.search.cluster import dask_client
 
 log = logging.getLogger(__name__)
 
@@ -215,7 +216,7 @@ def _executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
     """Worker processes of this machine, or those of a cluster; what still runs is given up when an
     error ends it."""
     if scheduler is not None:
-        with _dask_client(scheduler) as client, client.get_executor(pure=False) as executor:
+        with dask_client(scheduler) as client, client.get_executor(pure=False) as executor:
             yield executor
         return
     from joblib.externals.loky.process_executor import ProcessPoolExecutor
@@ -227,21 +228,6 @@ def _executor(jobs: int, scheduler: str | None) -> Iterator[Executor]:
         executor.shutdown(kill_workers=True)
         raise
     executor.shutdown()
-
-
-def _dask_client(scheduler: str) -> Any:
-    try:
-        from distributed import Client
-    except ImportError:
-        raise InputError(
-            "needs Dask: install kop_exudyn[cluster]", field="scheduler", value=scheduler
-        ) from None
-    try:
-        return Client(scheduler, timeout=20, set_as_default=False)
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"no Dask scheduler answers: {error}", field="scheduler", value=scheduler
-        ) from None
 
 
 def _plain(value: Any) -> Any:
