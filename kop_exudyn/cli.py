@@ -10,7 +10,7 @@ import logging
 import os
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
 from importlib import import_module
 from keyword import iskeyword
@@ -20,6 +20,7 @@ from typing import NoReturn
 from . import __version__
 from .commands import NAMES
 from .commands.colour import RED, LogFormatter, coloured
+from .commands.help_text import HelpFormatter
 from .errors import InputError, OccupiedError, SimulationFailure, did_you_mean
 
 # Imports make many objects that stay. To look through them for garbage after every 700 new ones, as
@@ -28,6 +29,7 @@ from .errors import InputError, OccupiedError, SimulationFailure, did_you_mean
 _NEW_OBJECTS = 50_000
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+_WRITTEN = ("out", "preview")  # what options and places for files are called that are written
 _ALIKE = 0.75  # of two names, from where on one may be meant by the other
 
 _DESCRIPTION = (
@@ -71,19 +73,14 @@ class _Parser(argparse.ArgumentParser):
         """All options that it takes."""
         return set(self._option_string_actions)
 
-    def inputs(self, args: argparse.Namespace) -> list[Path]:
-        """Files and folders that are given by their places, but for one to write to ("out")."""
-        values = [
-            getattr(args, action.dest)
-            for action in self._get_positional_actions()
-            if action.type is Path and action.dest != "out"
-        ]
-        return [
-            path
-            for value in values
-            for path in (value if isinstance(value, list) else [value])
-            if path is not None
-        ]
+    def inputs(self, args: argparse.Namespace) -> Iterator[tuple[Path, str]]:
+        """What is read, "file" or "folder" as it looks: by places, then by options, which take
+        files; not what is written to."""
+        for action in (*self._get_positional_actions(), *self._get_optional_actions()):
+            value = getattr(args, action.dest, None)
+            if action.type is Path and action.dest not in _WRITTEN and value is not None:
+                for path in value if isinstance(value, list) else [value]:
+                    yield path, "file" if path.suffix or action.option_strings else "folder"
 
 
 def _suggesting(message: str) -> str:
@@ -128,9 +125,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     atexit.unregister(gc.freeze)  # of a call before, in the same process
     atexit.register(gc.freeze)
     try:
-        for path in args.command.inputs(args):
+        for path, kind in args.command.inputs(args):
             if not os.path.exists(path):
-                kind = "file" if path.suffix else "folder"
                 raise InputError(f"no such {kind}{_nearby(path)}", source=path)
         status = args.run(args)
         sys.stdout.flush()  # here, where a reader that has gone can be dealt with
@@ -166,7 +162,7 @@ def make_parser() -> argparse.ArgumentParser:
         prog="kop",
         description=_DESCRIPTION,
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=HelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"kop_exudyn {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
@@ -178,7 +174,7 @@ def make_parser() -> argparse.ArgumentParser:
             help=command.HELP,
             description=command.DESCRIPTION,
             epilog=f"{command.EXAMPLES}\n\n{_STATUS}",
-            formatter_class=argparse.RawDescriptionHelpFormatter,
+            formatter_class=HelpFormatter,
         )
         command.arguments(subparser)
         subparser.set_defaults(run=command.run, parser=parser, command=subparser)

@@ -238,8 +238,8 @@ def simulate(design: Design, loads: LoadCase | None = None, engine: str = FAST) 
     if result.displaced_percent > max(_FAR_AWAY, _SLID * fit.max_percent):
         log.warning(
             "%s: on the surface, but joints end up to %.3g %% of its size away from their "
-            "places: the "
-            "structure hardly resists that motion",
+            "places: the structure hardly resists that motion. Hold it where its supports will be: "
+            "by the field held of a grid's file, or --held at import",
             design.name,
             result.displaced_percent,
         )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..wording import counted_parts
 from .options import add_cost, add_designs, add_processes, add_results, add_selection
-from .output import add_json, report
+from .output import add_json, report, shows_progress
 from .values import (
     not_negative,
     not_negative_number,
@@ -235,7 +235,7 @@ def run(args: argparse.Namespace) -> int:
             published=args.published,
         ),
         overwrite=args.overwrite,
-        progress=not args.quiet,
+        progress=shows_progress(args),
         kit=kit,
         verdict=study.verdict,
     )
@@ -323,7 +323,7 @@ def _smallest(args: argparse.Namespace, study: Study, parts: dict[str, int]) -> 
         inputs=study.files,
         resume=args.resume,
         overwrite=args.overwrite,
-        progress=not args.quiet,
+        progress=shows_progress(args),
     )
     page = args.out / "index.html"
     row = chosen.row(cost)

@@ -16,6 +16,11 @@ def add_json(parser: argparse.ArgumentParser, help: str = "print JSON for other 
     parser.add_argument("--json", action="store_true", help=help)
 
 
+def shows_progress(args: argparse.Namespace) -> bool:
+    """Whether a bar is drawn on standard error: on terminals, which files and pipes are not."""
+    return not args.quiet and sys.stderr.isatty()
+
+
 def report(args: argparse.Namespace, data: Mapping[str, Any], text: str) -> None:
     """Write a command's outcome: with --json the data, otherwise the text."""
     from ..files.json_files import to_json

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from .options import add_cost, add_designs, add_processes, add_results, add_selection
-from .output import add_json, report
+from .output import add_json, report, shows_progress
 from .values import part_ranges
 
 HELP = "find kits of several sizes, and show what each part more is worth"
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
         inputs=study.files,
         resume=args.resume,
         overwrite=args.overwrite,
-        progress=not args.quiet,
+        progress=shows_progress(args),
     )
     page = args.out / "index.html"
     warnings = list(kits[0].result.warnings)

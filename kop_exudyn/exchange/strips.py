@@ -25,6 +25,8 @@ _TIP = 65  # places in which the tip of an axis is searched for
 # times the median width: what the widest place may be of a strip, and of one that is very narrow;
 # an ellipse's is 1.15
 _EVEN, _TAPERED = 1.1, 1.5
+# of a loop's area, what a draughtsman's crossed corners may take off it
+_SIMPLE = 0.95
 _PIECES = 12  # drawn pieces that an outline may consist of, at most
 _BESIDE = (
     0.05  # of their lengths: two lines so near to each other all along may be one lath's sides
@@ -69,7 +71,11 @@ def is_narrow(points: np.ndarray) -> bool:
 
 
 def _narrowness(points: np.ndarray) -> float:
+    """Four pi area / perimeter^2 of a loop; infinite of one that crosses itself, whose parts cancel
+    each other in the area (a figure of eight, or laths that go on from edge to edge of a net)."""
     polygon = shapely.Polygon(points)
+    if polygon.area < _SIMPLE * shapely.make_valid(polygon).area:
+        return np.inf
     return 4 * np.pi * polygon.area / polygon.length**2
 
 

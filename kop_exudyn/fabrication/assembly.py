@@ -10,6 +10,7 @@ import numpy as np
 
 from ..files.tables import write_csv
 from ..kit.kinds import part_kind
+from .cells import sorts_of_arms
 from .lamellas import LOWER, Lamellas
 from .options import millimetres
 from .pieces import PartsList, Piece
@@ -20,7 +21,9 @@ def assembly_plan(parts: PartsList, name: str, unit: str) -> list[dict[str, Any]
     """One row an element of the design of that name, in the elements' order.
 
     Of all: the lamella that it belongs to, and its place along it, from 1 (see `lamellas`).
-    Of a beam: the joint that it carries (of a cell: all that its bars end at), whether it is the
+    Of a cell, the sort of its arms ("a" or "b", see `cells`), all joints that they end at, and at
+    its top plate (side 1) and its bottom plate (side 2) which of the part's two lengths they have.
+    Of a beam: the joint that it carries, whether it is the
     lower or the upper one there and which lamella it crosses, and for each of its sides in the
     lamella's direction the part's side used there, its length and the corner or free end that it
     leads to. Of a corner: its signed turn, and the elements before and after it; positive turns are
@@ -78,6 +81,16 @@ def joint_table(parts: PartsList, name: str, unit: str, points: np.ndarray) -> l
     return rows
 
 
+def joint_places(parts: PartsList, name: str) -> np.ndarray:
+    """(n_joints, 3) where a design's joints are in its built state: in its unit of length, in its
+    user's coordinates."""
+    number = parts.row_of(name)
+    placed = PlacedPieces.of(parts.designs[number])
+    role = placed.design.fitted_role.name
+    state = parts.states[number][role] if parts.states else placed.scene.initial
+    return state.positions[placed.design.joints] + placed.design.origin
+
+
 def _along(lamellas: Lamellas, piece: Piece, on_edge: bool) -> dict[str, Any]:
     """Where a piece is along its lamella, and how it crosses the other one."""
     if piece.element not in lamellas.place:
@@ -104,6 +117,9 @@ def _where(placed: PlacedPieces, parts: PartsList, piece: Piece, scale: float) -
     if part_kind(piece.kind).angular:
         return _corner(placed, piece)
     row: dict[str, Any] = {"joint": " ".join(map(str, placed.joints_of(piece)))}
+    hardware = placed.design.hardware
+    if hardware is not None:
+        row = {"arms": sorts_of_arms(piece, hardware)} | row
     names = part_kind(piece.kind).parameter_names
     for side, (parameter, column, value) in enumerate(
         zip(piece.parameters, piece.columns, piece.values), 1
@@ -111,8 +127,9 @@ def _where(placed: PlacedPieces, parts: PartsList, piece: Piece, scale: float) -
         row |= {
             f"side_{side}": names[column],
             f"side_{side}_mm": round(value * scale, 4),
-            f"side_{side}_towards": _leads_to(placed, parts, parameter),
         }
+        if hardware is None:
+            row[f"side_{side}_towards"] = _leads_to(placed, parts, parameter)
     return row
 
 

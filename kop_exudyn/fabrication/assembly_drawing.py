@@ -29,6 +29,7 @@ from ..files.files import file_stem, make_folder
 from ..kit.kinds import has_joint, part_kind
 from ..scene.state import State
 from .assembly import stands_on_edge
+from .cells import sorts_of_arms
 from .lamellas import UPPER, Lamellas
 from .options import millimetres
 from .paper import SCALES, Book, fitting_scale, scale_name
@@ -153,7 +154,10 @@ class AssemblyDrawing:
                 for turn in _AROUND
             ]
             turned = "m" if piece.variant == "mirrored" else ""
-            yield Label(f"{label}{turned}\n{piece.element}", 5.5, np.array([middle, *around]))
+            hardware = self.placed.design.hardware
+            sort = "" if hardware is None else f"·{sorts_of_arms(piece, hardware)}"
+            text = f"{label}{turned}{sort}\n{piece.element}"
+            yield Label(text, 5.5, np.array([middle, *around]))
             return
         for line, column in zip(lines, piece.columns):
             alone = len(lines) == 1
@@ -464,7 +468,8 @@ def explanation(placed: PlacedPieces) -> str:
         )
     else:
         text = (
-            "part (m: mirrored, top and bottom change places), below it the element · grey: joint"
+            "part (m: mirrored, top and bottom change places; ·a, ·b: the sort of its arms), below "
+            "it the element · grey: joint · seen from above"
         )
     if not any(part_kind(kind).angular for kind in kinds):
         return text

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterator
 from typing import Any
 
+from ..kit.kinds import part_kind
 from .assembly import stands_on_edge
 from .blanks import Blanks
-from .cells import CellParts
+from .cells import CellParts, sorts_of_arms
 from .lamellas import LOWER, UPPER, Lamella, Lamellas
 from .pieces import DesignPieces
 from .placement import PlacedPieces
@@ -21,12 +24,15 @@ def assembly_steps(blanks: Blanks, name: str) -> list[dict[str, Any]]:
     First every lamella is bolted together on a bench, then all lower ones are laid out, then the
     upper ones put on them, joint by joint. Where the two don't separate into families, lamellas
     come in the order of their numbers, each with the joints whose other lamella is there already.
-    A design of several states is assembled in the first and opened into the last. Nothing for
-    parts that aren't lamellas.
+    A design of several states is assembled in the first and opened into the last. Of cells, arms
+    and plates are made ready, then every cell is hinged together, then the joints are closed.
+    Nothing for other parts.
 
     Raises InputError for a design that isn't there.
     """
     pieces = blanks.parts.named(name)
+    if blanks.cells is not None:
+        return [{"step": n} | step for n, step in enumerate(_cell_steps(blanks, pieces), 1)]
     lamellas = Lamellas(PlacedPieces.of(pieces))
     if not lamellas.all:
         return []
@@ -48,8 +54,35 @@ def assembly_steps(blanks: Blanks, name: str) -> list[dict[str, Any]]:
         steps.append(_step(action, lamella, joints=" ".join(map(str, joints)) or None))
     roles = pieces.design.roles
     if len(roles) > 1:
-        steps.append({"action": f"open from the {roles[-1].name} to the {roles[0].name} state"})
+        steps.append({"action": f"open it into its {roles[0].name} state: joints as listed"})
     return [{"step": number} | step for number, step in enumerate(steps, 1)]
+
+
+def _cell_steps(blanks: Blanks, pieces: DesignPieces) -> Iterator[dict[str, Any]]:
+    """How a design of cells is put together; of every cell, which arms are at its upper and at its
+    lower plate, as "2 x C1 top a"."""
+    hardware = pieces.design.hardware
+    assert hardware is not None
+    placed, arms = PlacedPieces.of(pieces), Counter(arm.parameter for arm in hardware.arms)
+    yield {"action": "lay up arms: board 2 on board 1, the plates' pin holes over each other"}
+    yield {"action": "put an ear into a plate's slot wherever an arm comes, on the inner face"}
+    for piece in pieces.pieces:
+        names, sort = part_kind(piece.kind).parameter_names, sorts_of_arms(piece, hardware)
+        label = blanks.parts.label(piece)
+        upper, lower = (
+            f"{arms[parameter]} x {label} {names[column]} {sort}"
+            for parameter, column in zip(piece.parameters, piece.columns)
+        )
+        yield {
+            "action": "hinge arms to both plates",
+            "element": piece.element,
+            "upper_plate": upper,
+            "lower_plate": lower,
+            "joints": " ".join(map(str, placed.joints_of(piece))),
+        }
+    yield {"action": "at every joint, pin one cell's upper arm and the other's lower one to a beam"}
+    yield {"action": "put the axles through both beams of every joint"}
+    yield {"action": "open it: draw the plates of every cell together"}
 
 
 def fasteners(blanks: Blanks) -> list[dict[str, Any]]:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from ..kit.kinds import part_kind
+from .assembly import joint_places, joint_table
 from .assembly_drawing import AssemblyDrawing, assembly_pages
 from .assembly_order import assembly_steps, fasteners
 from .blanks import Blanks
-from .cutlist import cut_list, totals
+from .cutlist import cut_list, purchases, totals
 from .cutsheets import Sheet
 from .options import Tolerances, tenths
 from .paper import Book
 from .part_pages import cell_pages, plate_pages, sheet_pages, stock_pages, strip_pages
-from .sources import sources
+from .sources import EITHER, sources
 from .stock import StockPlan
 
 # of cut lists, what stands in the note above or on the parts' own pages
@@ -30,6 +31,11 @@ _ENDS = (
     "Of a lamella's first and last piece one side is used. The other one stands out beyond the "
     "last joint and carries nothing:\nit may be sawn off behind the joint where it is in the way "
     "and no other design needs the whole piece."
+)
+
+_JOINTS = (
+    "Where the joints are in the built state, to set it out and to check it by. Angle: between the "
+    "pieces that cross"
 )
 
 
@@ -52,7 +58,7 @@ def workshop_book(
     rows = cut_list(blanks, tolerances)
     kept = [{name: value for name, value in row.items() if name not in _ELSEWHERE} for row in rows]
     book.table("Cut list", kept, _note(blanks, tolerances))
-    material = totals(blanks)
+    material = [*totals(blanks), *purchases(blanks, sheets, plan)]
     book.table("Material and fasteners", [*material, *fasteners(blanks)])
     strip_pages(book, blanks)
     plate_pages(book, blanks)
@@ -61,8 +67,13 @@ def workshop_book(
     sheet_pages(book, sheets)
     for drawing in drawings:
         if steps := assembly_steps(blanks, drawing.name):
-            book.table(f"Assembly of {drawing.name}: steps", steps, _ENDS)
+            note = _ENDS if blanks.strips else ""
+            book.table(f"Assembly of {drawing.name}: steps", steps, note)
         assembly_pages(book, drawing)
+        points = joint_places(blanks.parts, drawing.name)
+        joints = joint_table(blanks.parts, drawing.name, blanks.unit, points)
+        pair = ", the elements lower and upper." if "lower" in joints[0] else "."
+        book.table(f"Joints of {drawing.name}, as it stands", joints, _JOINTS + pair)
     return book
 
 
@@ -82,6 +93,9 @@ def _note(blanks: Blanks, tolerances: Tolerances) -> str:
             "are lengths of the axes from the joint to the corner points, "
             f"{tenths(blanks.corners.setback)} mm beyond either sawn end."
         )
-    if note := sources(blanks).note:
-        lines.append(note)
+    source = sources(blanks)
+    if source.note:
+        lines.append(source.note)
+    if source.either:
+        lines.append(EITHER)
     return "\n".join(lines)

@@ -36,6 +36,12 @@ _TAB = (1.0, 2.5)  # of the thickness: where an ear's tab begins and ends, inwar
 _CHORDS = 12  # of a quarter circle
 
 
+def sorts_of_arms(piece: Piece, hardware: CellHardware) -> str:
+    """The sorts of a cell's arms, as "a", "b" or, where they differ, "a b"; see `ArmPart`."""
+    own = {arm.sort for arm in hardware.arms if arm.parameter in piece.parameters}
+    return " ".join(sorted(own))
+
+
 @dataclass(frozen=True)
 class ArmPart:
     """Arms of one length and one sort: "a", both pins on one face, or "b", on opposite ones.
@@ -124,18 +130,20 @@ class CellParts:
         """Arms by part, length and sort."""
         found = []
         for sort in sorted(set().union(*self.counts)):
-            kind, part, name, opposite = sort
-            label = f"{self.parts.labels[kind][part]} {name} {'b' if opposite else 'a'}"
+            kind, part, name, letter = sort
+            label = f"{self.parts.labels[kind][part]} {name} {letter}"
             column = self._columns(kind).index(name)
             length = self.scale * float(self.parts.kit.parts[kind][part, column])
             side = self.thickness / 2
             by_design = tuple(counts[sort] for counts in self.counts)
-            found.append(ArmPart(label, by_design, length, (-side, side if opposite else -side)))
+            found.append(
+                ArmPart(label, by_design, length, (-side, side if letter == "b" else -side))
+            )
         return tuple(found)
 
     @cached_property
     def counts(self) -> tuple[Counter[tuple], ...]:
-        """By design: (kind, part, name of the length, pins on opposite faces?) -> arms."""
+        """By design: (kind, part, name of the length, "a" or "b") -> arms."""
         found = []
         for pieces, hardware in zip(self.parts.designs, self.hardware):
             counts: Counter[tuple] = Counter()
@@ -143,7 +151,7 @@ class CellParts:
                 piece: Piece = pieces.by_parameter[arm.parameter]
                 column = piece.columns[piece.parameters.index(arm.parameter)]
                 name = self._columns(piece.kind)[column]
-                counts[piece.kind, piece.part, name, arm.opposite] += 1
+                counts[piece.kind, piece.part, name, arm.sort] += 1
             found.append(counts)
         return tuple(found)
 

@@ -3,7 +3,8 @@ designs."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,11 @@ from ..files.tables import write_csv
 from ..kit.kinds import PartKind, part_kind
 from .blanks import Blanks, Strip
 from .cells import CellParts
+from .cutsheets import Sheet
 from .options import Tolerances
 from .pieces import PartsList
+from .sources import sources
+from .stock import StockPlan
 
 _DIGITS = 3  # of millimetres: sums over a whole lamella stay exact to 0.1 mm
 _DIGITS_DEG = 4
@@ -109,6 +113,41 @@ def totals(blanks: Blanks) -> list[dict[str, Any]]:
                 "material": board.material or None,
                 "pieces": sum(bar.count for bar in blanks.bars),
                 "length_m": round(length, 3),
+            }
+        )
+    return rows
+
+
+def purchases(
+    blanks: Blanks, sheets: Sequence[Sheet], plan: StockPlan | None
+) -> list[dict[str, Any]]:
+    """One row a size of bars and sheets to buy: how many, their length in m or area in m2.
+
+    Where straight pieces may come from either (see `sources`), sheets hold them as well, and bars
+    are bought instead.
+    """
+    either = sources(blanks).either
+    rows: list[dict[str, Any]] = []
+    lengths = Counter(bar.length for bar in plan.bars) if plan is not None else Counter()
+    for length, number in sorted(lengths.items(), reverse=True):
+        rows.append(
+            {
+                "item": f"to buy: bars of {length:g} mm{', or sheets' if either else ''}",
+                "section_mm": blanks.board.section,
+                "material": blanks.board.material or None,
+                "pieces": number,
+                "length_m": round(number * length / 1000, 3),
+            }
+        )
+    sizes = Counter((*sheet.size, sheet.thickness) for sheet in sheets)
+    for (width, height, thickness), number in sizes.items():
+        rows.append(
+            {
+                "item": f"to buy: sheets of {width:g} x {height:g} mm, "
+                f"{'for all parts' if either else 'as drawn'}",
+                "section_mm": f"{thickness:g} thick",
+                "pieces": number,
+                "area_m2": round(number * width * height / 1e6, 4),
             }
         )
     return rows

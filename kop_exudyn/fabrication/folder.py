@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-import numpy as np
-
 from ..errors import InputError
-from ..files.files import file_stem, make_folder
+from ..files.files import file_stem, make_folder, write_text
 from ..files.tables import write_csv
-from .assembly import joint_table, write_assembly_plan
+from .assembly import joint_places, joint_table, write_assembly_plan
 from .assembly_drawing import assembly_drawing, save_assembly_drawing
 from .assembly_order import assembly_steps, fasteners
 from .blanks import Blanks
 from .book import workshop_book
-from .cutlist import totals, write_bill, write_cut_list
+from .cutlist import purchases, totals, write_bill, write_cut_list
 from .cutsheets import Sheet, cut_sheets, template_sheets
 from .dxf import write_dxf
 from .options import CutOptions, Tolerances
 from .pieces import PartsList
-from .placement import PlacedPieces
+from .read_me import read_me
 from .stock import StockPlan, stock_plan
 from .svg import write_svg
 
@@ -44,7 +43,8 @@ def export_workshop(
 
     Tables (CSV): cut_list, material, fasteners, bars; of every design its bill, assembly plan,
     steps and joints. Drawings: workshop.pdf to print, the assembly of every design (SVG), cut
-    sheets and templates at true scale.
+    sheets and templates at true scale. READ_ME.txt says what each of these files is, and what the
+    tables' columns mean.
 
     Parameters
     ----------
@@ -71,7 +71,11 @@ def export_workshop(
     )
     folder = make_folder(folder)
     done = [write_cut_list(folder / "cut_list.csv", blanks, tolerances, overwrite=overwrite)]
-    tables = {"material": totals(blanks), "fasteners": fasteners(blanks), "bars": bar_rows(bars)}
+    tables = {
+        "material": [*totals(blanks), *purchases(blanks, sheets, bars)],
+        "fasteners": fasteners(blanks),
+        "bars": bar_rows(bars),
+    }
     for pieces in parts.designs:
         name, stem = pieces.design.name, file_stem(pieces.design.name)
         done.append(write_bill(folder / f"bill_{stem}.csv", parts, [name], overwrite=overwrite))
@@ -92,7 +96,8 @@ def export_workshop(
         "templates": template_sheets(blanks, force=force),
     }.items():
         done += _write_sheets(found, folder / stem, writers, overwrite)
-    return done
+    text = read_me(title, blanks, done, {path.name: _columns(path) for path in done})
+    return [*done, write_text(folder / "READ_ME.txt", text, overwrite=overwrite)]
 
 
 def _bars(blanks: Blanks, force: bool) -> StockPlan | None:
@@ -103,6 +108,14 @@ def _bars(blanks: Blanks, force: bool) -> StockPlan | None:
         if not force:
             raise
         return None
+
+
+def _columns(path: Path) -> list[str]:
+    """Names of a table's columns; none of other files."""
+    if path.suffix != ".csv":
+        return []
+    with path.open(newline="", encoding="utf-8") as file:
+        return next(csv.reader(file), [])
 
 
 def bar_rows(plan: StockPlan | None) -> list[dict[str, object]]:
@@ -119,16 +132,6 @@ def bar_rows(plan: StockPlan | None) -> list[dict[str, object]]:
             rows.append(row | {"to_mm": round(at + length, 3), "left_mm": round(bar.left, 1)})
             at += length + kerf
     return rows
-
-
-def joint_places(parts: PartsList, name: str) -> np.ndarray:
-    """(n_joints, 3) where a design's joints are in its built state: in its unit of length, in its
-    user's coordinates."""
-    number = parts.row_of(name)
-    placed = PlacedPieces.of(parts.designs[number])
-    role = placed.design.fitted_role.name
-    state = parts.states[number][role] if parts.states else placed.scene.initial
-    return state.positions[placed.design.joints] + placed.design.origin
 
 
 def _write_sheets(

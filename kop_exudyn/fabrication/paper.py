@@ -279,7 +279,8 @@ def _cell(name: str, value: Any) -> str:
         return ""
     if isinstance(value, float) and not name.endswith(_BOUGHT):
         digits = {"mm": 1, "deg": 2, "m": 2, "m2": 3}.get(name.rpartition("_")[2])
-        return f"{value:g}" if digits is None else f"{value:.{digits}f}"
+        # + 0.0: what is rounded to nothing has no sign
+        return f"{value:g}" if digits is None else f"{round(value, digits) + 0.0:.{digits}f}"
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 

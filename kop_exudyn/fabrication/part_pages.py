@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -98,8 +99,9 @@ def cell_pages(book: Book, blanks: Blanks) -> None:
     size = np.max([template.size for template in wanted], axis=0)
     scale = fitting_scale(size, room - [12.0, 30.0])
     note = (
-        f"Pins {cells.pin:g} mm, along the plates' edges. Arms are laid up of two boards (1 with "
-        "the disc, 2 without); at a crossing the discs of two arms lie side by side, locked by two "
+        f"Pins {cells.pin:g} mm, along the plates' edges. Plates are seen from outside; ears sit "
+        "on their inner faces. Arms are laid up of two boards (1 with the disc, 2 without); at a "
+        "crossing the discs of two arms lie side by side, locked by two "
         f"pins of {cells.thickness / 4:g} mm."
     )
     page, at, below = None, np.zeros(2), 0.0
@@ -153,7 +155,8 @@ def stock_pages(book: Book, blanks: Blanks, plan: StockPlan | None) -> None:
             page.text(
                 page.low[0],
                 page.high[1],
-                f"{counted(len(plan.bars), 'bar')}, {plan.length / 1000:.2f} m in all, "
+                f"{counted(len(plan.bars), 'bar')}: {_lengths(plan)}; "
+                f"{plan.length / 1000:.2f} m in all, "
                 f"{100 * plan.used:.0f} % of it used; no plan needs less than "
                 f"{plan.least / 1000:.2f} m. "
                 f"Kerf {blanks.options.kerf:g} mm. Saw from the left; lengths in mm.",
@@ -193,11 +196,19 @@ def stock_pages(book: Book, blanks: Blanks, plan: StockPlan | None) -> None:
         page.text(
             page.low[0] + _NUMBERS + 2.0 + bar.length / scale,
             y + 2.0,
-            (f"{len(alike)} alike, " if len(alike) > 1 else "") + f"left {bar.left:.0f}",
+            f"of {bar.length:g}, "
+            + (f"{len(alike)} alike, " if len(alike) > 1 else "")
+            + f"left {bar.left:.0f}",
             6.5,
             va="center",
             color=QUIET,
         )
+
+
+def _lengths(plan: StockPlan) -> str:
+    """ "5 of 4800 mm, 12 of 2400 mm": the bars of a plan, the longest first."""
+    counts = Counter(bar.length for bar in plan.bars)
+    return ", ".join(f"{counts[length]} of {length:g} mm" for length in sorted(counts)[::-1])
 
 
 def _runs(items: Sequence[Any]) -> list[list[int]]:

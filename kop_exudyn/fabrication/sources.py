@@ -18,6 +18,10 @@ from .options import CutOptions
 from .shapes import Template
 from .templates import templates
 
+EITHER = (
+    "Straight pieces may be sawn from bars or cut from sheets: both plans are there, choose one. "
+    "Everything else comes from the sheets."
+)
 _ROUND = 10  # mm, that sizes of sheets and bars are rounded up to
 
 
@@ -28,12 +32,15 @@ class Sources:
     sheets, bars : whether all of them fit a sheet, and a bar that there is
     note : for readers of the files, where sheets or bars won't do and the other ones will; or empty
     problem : why neither will do, and what would; or empty
+    either : whether there are straight pieces and both will do: files then have both, for a
+        workshop to choose
     """
 
     sheets: bool = True
     bars: bool = True
     note: str = ""
     problem: str = ""
+    either: bool = False
 
 
 def sources(blanks: Blanks) -> Sources:
@@ -65,7 +72,7 @@ def sources(blanks: Blanks) -> Sources:
             f"Straight pieces are cut from sheets: part {longest} of {lengths[longest]:.0f} mm is "
             f"longer than the longest bar of {bar:g} mm."
         )
-    return Sources(sheets, bars, note)
+    return Sources(sheets, bars, note, either=sheets and bars and bool(options.stock))
 
 
 def on_sheets(blanks: Blanks) -> list[Template]:

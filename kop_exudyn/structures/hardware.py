@@ -28,6 +28,12 @@ class Arm:
         """Whether the pins lie on opposite faces of the arm."""
         return self.offsets[0] * self.offsets[1] < 0
 
+    @property
+    def sort(self) -> str:
+        """What workshops call it: "a" with both pins on one face, "b" with pins on opposite
+        ones."""
+        return "b" if self.opposite else "a"
+
 
 @dataclass(frozen=True)
 class CellHardware:

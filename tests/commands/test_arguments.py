@@ -3,11 +3,13 @@
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from support.commands import status_of
 
 from kop_exudyn import __version__
+from kop_exudyn.cli import make_parser
 from kop_exudyn.commands import NAMES
 
 
@@ -120,3 +122,40 @@ def test_messages_say_what_was_meant(line, message, repository, tmp_path, capsys
     assert status_of(*words) == 2
     assert re.search(message, capsys.readouterr().err)
     assert not (tmp_path / "out").exists() and [p.name for p in full.iterdir()] == ["notes.txt"]
+
+
+@pytest.mark.parametrize("columns", [60, 80, 120])
+def test_help_is_as_wide_as_the_terminal(monkeypatch, columns):
+    """Paragraphs were written for 100 columns once, and broken anyhow by narrower terminals. Lines
+    to type stay whole."""
+    monkeypatch.setenv("COLUMNS", str(columns))
+    subparsers = make_parser()._subparsers._group_actions[0].choices
+    assert set(subparsers) == set(NAMES)
+    for parser in subparsers.values():
+        text = parser.format_help()
+        described = text.split("\n\n", 1)[1]
+        for line in described.split("\nexamples:")[0].splitlines():
+            assert len(line) <= columns
+        words = " ".join(described.split())
+        assert " ".join(parser.description.split())[:200] in words
+        assert parser.epilog.split("\n\n")[0] in text  # the examples, line by line
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "import net.dxf --as grid --surface vualt.obj --out a.json",
+        "import net.dxf --target vualt.obj --out a.json",
+        "optimize . --stock vualt.obj --out out",
+        "optimize . --kit vualt.obj --parts liner=3 --out out",
+    ],
+)
+def test_files_that_options_name_are_looked_for_first(command, tmp_path, monkeypatch, capsys):
+    """Before anything else is missed: a section, say."""
+    monkeypatch.chdir(tmp_path)
+    Path("net.dxf").touch()
+    Path("vault.obj").touch()
+    assert status_of(*command.split()) == 2
+    told = capsys.readouterr().err
+    assert told == "kop: vualt.obj: no such file (did you mean 'vault.obj'?)\n"
+    assert not Path("out").exists()

@@ -1,5 +1,6 @@
 """What the command line prints whatever the command: messages of one line, colours, verbosity."""
 
+import argparse
 import io
 import logging
 import subprocess
@@ -8,6 +9,7 @@ import sys
 import pytest
 from support.commands import status_of
 
+from kop_exudyn.commands.output import shows_progress
 from kop_exudyn.errors import InputError
 
 
@@ -80,3 +82,12 @@ def test_a_reader_that_stops_early_is_no_error(joints):
     with process.stderr:
         assert process.stderr.read() == ""
     assert process.wait() == 0
+
+
+def test_a_bar_is_drawn_on_terminals_only(monkeypatch):
+    """Files got it all on one line, with carriage returns."""
+    args = argparse.Namespace(quiet=False)
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    assert not shows_progress(args)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    assert shows_progress(args) and not shows_progress(argparse.Namespace(quiet=True))

@@ -6,6 +6,7 @@ import json
 import math
 from pathlib import Path
 
+import ezdxf
 import numpy as np
 import pytest
 import shapely
@@ -13,7 +14,7 @@ import shapely
 from kop_exudyn.cli import main
 from kop_exudyn.exchange.drawing import DrawnCurve
 from kop_exudyn.exchange.other_formats import instead_of
-from kop_exudyn.exchange.strips import axes_of_strips
+from kop_exudyn.exchange.strips import axes_of_strips, is_narrow
 
 FILES = Path(__file__).parents[1] / "corpus" / "files"
 
@@ -111,3 +112,29 @@ def test_a_ring_and_a_wedge_are_no_strips():
     ]
     kept, _, said = axes_of_strips(curves, [ring, wedge], 1e-4)
     assert kept == curves and not said
+
+
+def test_laths_that_go_on_from_edge_to_edge_of_a_net_are_no_outline(tmp_path, capsys):
+    """A net of diagonals within a rectangle, as lamella roofs have it: laths meet at its edges two
+    by two and so go round closed loops, which cross themselves. Their areas cancel, as those of
+    narrow loops vanish."""
+    box, drawing, drawn = shapely.box(-6.0, -4.0, 6.0, 4.0), ezdxf.new(units=6), 0
+    for c in np.arange(-12.0, 12.1, 2.0):
+        for s in (1, -1):
+            lath = shapely.LineString([(c - 20, -20 * s), (c + 20, 20 * s)]).intersection(box)
+            if lath.length > 2.5:
+                drawing.modelspace().add_lwpolyline(list(lath.coords))
+                drawn += 1
+    drawing.saveas(tmp_path / "roof.dxf")
+    status, told = imported(tmp_path, capsys, tmp_path / "roof.dxf")
+    assert status == 0 and drawn == 18
+    assert (told["summary"]["curves"], told["summary"]["joints"]) == (18, 55)
+    assert not any("outline" in finding["text"] for finding in told["findings"])
+
+
+def test_a_curve_that_crosses_itself_is_no_outline():
+    t = np.linspace(0, 2 * np.pi, 80, endpoint=False)
+    assert not is_narrow(np.stack([np.cos(t), 0.5 * np.sin(2 * t)], axis=1))
+    thin = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 0.2], [0.0, 0.2]])
+    sloppy = np.insert(thin, 2, [[10.02, 0.01], [9.99, -0.01]], axis=0)  # corners that miss
+    assert is_narrow(thin) and is_narrow(sloppy)

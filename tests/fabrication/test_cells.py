@@ -1,12 +1,16 @@
 """Cells as things that can be made: pins, discs and hinges, put together again on the table."""
 
+from collections import Counter
+
 import numpy as np
 import pytest
 import shapely
 
 import kop_exudyn as kop
 from kop_exudyn.errors import InputError
-from kop_exudyn.fabrication.assembly_order import fasteners
+from kop_exudyn.fabrication.assembly import assembly_plan
+from kop_exudyn.fabrication.assembly_drawing import assembly_drawing, explanation
+from kop_exudyn.fabrication.assembly_order import assembly_steps, fasteners
 from kop_exudyn.fabrication.blanks import Blanks
 from kop_exudyn.fabrication.cutlist import cut_list, totals
 from kop_exudyn.fabrication.cutsheets import cut_sheets
@@ -166,4 +170,51 @@ def test_smaller_holes_are_taken_and_plates_without_room_are_named(parts, reposi
 def test_the_folder_of_a_kit_of_cells(parts, tmp_path):
     files = {path.name for path in export_workshop(parts, tmp_path, "mm", formats=["dxf"])}
     assert {"workshop.pdf", "cut_list.csv", "fasteners.csv", "joints_hill.csv"} <= files
-    assert "bars.csv" not in files and "steps_hill.csv" not in files
+    assert "steps_hill.csv" in files and "bars.csv" not in files
+
+
+def test_which_arms_are_where_is_written_and_drawn(hill, parts):
+    """Arms of one length come in two sorts. Nothing said once which of them a cell takes."""
+    hardware = hill.hardware
+    wanted = {arm.parameter: "ab"[arm.opposite] for arm in hardware.arms}
+    plan = {row["element"]: row for row in assembly_plan(parts, "hill", "mm")}
+    steps = [s for s in assembly_steps(Blanks(parts, "mm"), "hill") if "element" in s]
+    texts = [label.text for label in _labels(parts)]
+    used = Counter()
+    for piece, step in zip(parts.designs[0].pieces, steps, strict=True):
+        sorts = {wanted[p] for p in piece.parameters if p in wanted}
+        assert plan[piece.element]["arms"] == "".join(sorts)
+        turned = "m" if piece.variant == "mirrored" else ""
+        label = parts.label(piece)
+        assert f"{label}{turned}·{plan[piece.element]['arms']}\n{piece.element}" in texts
+        for plate in ("upper_plate", "lower_plate"):
+            number, arm = step[plate].split(" x ")
+            used[arm] += int(number)
+    # as many of every label as are cut
+    cut = {t.label: t.by_design[0] for t in Blanks(parts, "mm").cells.templates()}
+    assert used == {label[:-1]: n for label, n in cut.items() if label.endswith("1")}
+
+
+def _labels(parts):
+    drawing = assembly_drawing(parts, "hill", "mm")
+    return drawing.labels(drawing.scale)[0]
+
+
+def test_plates_are_drawn_as_seen_from_above(hill, parts):
+    def turning(corners):
+        a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        return np.sign(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+    drawing = assembly_drawing(parts, "hill", "mm")
+    np.testing.assert_array_equal(turning(drawing.cells), turning(hill.hardware.corners))
+    assert "seen from above" in explanation(drawing.placed)
+
+
+def test_a_beam_is_one_cells_upper_arm_and_the_others_lower_one(hill):
+    """As the steps say: rods on one side of an X joint."""
+    rods = hill.mesh.rods
+    for joint in hill.mesh.crossings:
+        arms = np.flatnonzero(rods.arms & (rods.joints[:, 1] == joint))
+        for side in (True, False):
+            beam = arms[rods.behind[arms, 1] == side]
+            assert sorted(rods.sides[beam]) == [0, 1] and len(set(rods.cells[beam])) == 2

@@ -6,11 +6,17 @@ import numpy as np
 import pypdf
 import pytest
 
+import kop_exudyn as kop
 from kop_exudyn.errors import InputError
+from kop_exudyn.fabrication.assembly import joint_places
 from kop_exudyn.fabrication.blanks import Blanks
-from kop_exudyn.fabrication.folder import export_workshop, joint_places
+from kop_exudyn.fabrication.folder import export_workshop
 from kop_exudyn.fabrication.options import CutOptions
+from kop_exudyn.fabrication.pieces import parts_list
+from kop_exudyn.fabrication.read_me import _COLUMNS, _FILES, explained
 from kop_exudyn.fabrication.stock import stock_plan
+from kop_exudyn.kit.cluster import cluster
+from kop_exudyn.structures.serving import served_by
 
 
 def read(path):
@@ -61,6 +67,62 @@ def test_material_adds_up(folder):
     assert strips["section_mm"] == "30 x 4"
 
 
+def test_bars_and_sheets_to_buy_are_those_that_are_planned(parts, folder):
+    """And where strips are on both, it is said that one of the two is meant."""
+    rows = {row["item"]: row for row in read(folder / "material.csv")}
+    bars = stock_plan(Blanks(parts, "m")).bars
+    for length in {bar.length for bar in bars}:
+        row = rows[f"to buy: bars of {length:g} mm, or sheets"]
+        assert int(row["pieces"]) == sum(bar.length == length for bar in bars)
+    sheets = len(list(folder.glob("cut_sheet_*.svg")))
+    assert int(rows["to buy: sheets of 1000 x 600 mm, for all parts"]["pieces"]) == sheets
+    pages = pypdf.PdfReader(folder / "workshop.pdf").pages
+    printed = " ".join(page.extract_text().replace("\n", " ") for page in pages)
+    told = " ".join((folder / "READ_ME.txt").read_text(encoding="utf-8").split())
+    assert "choose one" in printed and "choose one" in told
+
+
+def test_nothing_is_to_choose_where_strips_fit_the_bars_alone(parts, tmp_path):
+    options = CutOptions(sheet=(300.0, 300.0))
+    export_workshop(parts, tmp_path, "m", options=options, formats=["svg"])
+    items = [row["item"] for row in read(tmp_path / "material.csv")]
+    assert "to buy: bars of 2400 mm" in items
+    assert "to buy: sheets of 300 x 300 mm, as drawn" in items
+    assert "choose one" not in (tmp_path / "READ_ME.txt").read_text(encoding="utf-8")
+
+
+def test_every_file_and_column_is_explained_beside_them(folder):
+    """By a text of its own: what nothing is known of stands there without any."""
+    assert_explained(folder)
+
+
+def assert_explained(folder):
+    text = (folder / "READ_ME.txt").read_text(encoding="utf-8")
+    for path in folder.iterdir():
+        if path.name != "READ_ME.txt":
+            assert path.name in " ".join(text.split()) and explained(path.stem, _FILES)
+            if path.suffix == ".csv":
+                for name in read(path)[0]:
+                    assert name in text and explained(name, _COLUMNS, whole=True), name
+
+
+def test_slits_and_cells_are_explained_too(repository, tmp_path):
+    for number, (file, sizes) in enumerate(
+        {
+            "small/01_sinh": {"slit": 3, "angular": 2},
+            "umbrellas/dome": {"cell": 3},
+            "grids/02_saddle": {"linear": 3, "angular": 2},
+        }.items()
+    ):
+        design = kop.load_design(repository / "models" / f"{file}.json")
+        (design,) = served_by([design], sizes)
+        found = cluster(design.groups, design.parameters, sizes)
+        folder = tmp_path / str(number)
+        listed = parts_list(found.kit, found.assignment, [design])
+        export_workshop(listed, folder, design.units.length, formats=["svg"], force=True)
+        assert_explained(folder)
+
+
 def test_joints_have_their_places_in_millimetres(parts, folder):
     rows = read(folder / "joints_first.csv")
     found = np.array([[float(row[f"{axis}_mm"]) for axis in "xyz"] for row in rows])
@@ -80,7 +142,14 @@ def test_the_book_is_of_that_paper_and_says_page_scale_and_title(parts, tmp_path
         assert f"Page {number} of {len(pages)}" in text and "Two shells" in text
         assert ("Scale 1:" in text) != ("Not to scale" in text)
     everything = " ".join(page.extract_text() for page in pages)
-    for label in ("A1", "L3", "Corner plates", "Bars to saw", "Assembly of second: steps"):
+    for label in (
+        "A1",
+        "L3",
+        "Corner plates",
+        "Bars to saw",
+        "Assembly of second: steps",
+        "Joints of second, as it stands",
+    ):
         assert label in everything
     for strip in Blanks(parts, "m").strips:
         assert f"{strip.cut_length:.1f}" in everything

@@ -50,8 +50,27 @@ def test_bars_that_are_alike_are_drawn_once(parts):
     )
     stock_pages(book, blanks, plan)
     told = texts(book)
-    assert "1–20" in told and "20 alike, left 5" in told and "21" in told and len(book.pages) == 1
+    assert (
+        "1–20" in told
+        and "of 9, 20 alike, left 5" in told
+        and "21" in told
+        and len(book.pages) == 1
+    )
     assert sum("4.0" in text or text == "L1" for text in told) == 1
+
+
+def test_bars_of_several_lengths_are_told_apart(parts):
+    """Nothing on the page said once how long a bar is: which ones to buy could not be read."""
+    blanks, book = Blanks(parts, "m"), Book("a3", "kit")
+    bars = (Bar(50.0, (("L1", 40.0),), 10.0), *(Bar(20.0, (("L2", 15.0),), 5.0),) * 3)
+    stock_pages(book, blanks, StockPlan(bars, 90.0))
+    told = texts(book)
+    assert any("4 bars: 1 of 50 mm, 3 of 20 mm; 0.11 m in all" in text for text in told)
+    assert "of 50, left 10" in told and "of 20, 3 alike, left 5" in told
+
+
+def test_what_is_rounded_to_nothing_has_no_sign():
+    assert [_cell("x_mm", x) for x in (-0.04, 0.0, -0.06)] == ["0.0", "0.0", "-0.1"]
 
 
 def test_sheets_that_are_alike_are_on_one_page(parts):

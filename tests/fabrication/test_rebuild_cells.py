@@ -90,9 +90,7 @@ def measured(design, folder):
         read(folder / f"assembly_{design.name}.csv"), key=lambda r: int(r["element"])
     ):
         for side in (row["side_1"], row["side_2"]):
-            q.append(
-                next(v[0] for k, v in lengths.items() if k.startswith(f"{row['part']} {side} "))
-            )
+            q.append(lengths[f"{row['part']} {side} {row['arms']}"][0])
     return np.array(q)
 
 

@@ -1,0 +1,131 @@
+"""What lies in the workshop's folder, for a reader who has nothing else: every file, and what the
+columns of the tables mean."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from textwrap import fill
+
+from .blanks import Blanks
+from .sources import EITHER, sources
+
+_WIDTH = 88
+# File names without their endings, the first that fits counts.
+_FILES = {
+    r"workshop$": "all of it to print: the lists, every part with its dimensions, bars, sheets, "
+    "and of every design its steps, drawing and joints. Print at 100 %; pages that are to scale "
+    "have a bar to check that by",
+    r"cut_list$": "one line a part: how many to make, and how to cut it",
+    r"material$": "what the parts take, and the bars and sheets to buy for them",
+    r"fasteners$": "bolts or pins, as many as the design with most of them needs",
+    r"bars$": "which piece is sawn from which bar, in order",
+    r"bill_": "how many pieces of each part the design of that name needs",
+    r"steps_": "in which order that design is put together",
+    r"assembly_": "where each piece of that design goes, which way round, and what it meets",
+    r"joints_": "where the joints of that design are when it stands",
+    r"cut_sheet_\d": "what a machine cuts from a sheet, at true scale in millimetres: layer CUT is "
+    "cut through, ENGRAVE marked, NOTES is for people",
+    r"templates_\d": "every part once, at true scale, to print and to mark by",
+}
+# Columns of the tables: the first that fits counts.
+_COLUMNS = {
+    r"part": "label of a part; pieces of one part are alike",
+    r"kind": "linear: a straight piece; angular: a corner; cell: two plates and their arms; slit: "
+    "a straight piece with slits for its bolts",
+    r"pieces": "how many to make or to buy: enough for any one of the designs",
+    r"in_.*": "how many of them the design of that name needs",
+    r"angle_deg": "of a corner: by how much the second strip turns against the first; of a joint: "
+    "between the pieces that cross, in degrees",
+    r"tolerance_(mm|deg)": "how exactly to cut",
+    r"leg_mm": "how far a corner plate reaches along either strip, from the corner point",
+    r"bolts_from_corner_mm": "middles of a corner plate's holes, along either strip from the "
+    "corner point",
+    r"(bolt|joint)_hole_mm": "diameter of the holes",
+    r"cut_length_mm": "of a straight piece, from sawn end to sawn end",
+    r"hole_from_end_mm": "middle of the joint's hole or slot, from the sawn end of side 1",
+    r"bolts_from_end_mm": "middles of the holes for corner plates, from the sawn end of side 1",
+    r"section_mm": "breadth by thickness, or the thickness of a sheet",
+    r"material": "as the designs name it",
+    r"slot_(width|depth)_mm": "of the slot in which a crossing piece sits",
+    r"setback_mm": "by how much either sawn end stands back from the corner point",
+    r"(l1|l2)_mm": "lengths of the axis from the joint to the corner points of sides 1 and 2; "
+    "where the part has slits, the longest ones",
+    r"slit_mm": "by how much shorter either side may be bolted",
+    r"(top|bottom)_mm": "lengths of a cell's arms, from pin to pin",
+    r"(arms|bars)_.*": "how many arms or bars of that length and sort",
+    r"item": "what it is",
+    r"(length_m|area_m2)": "of all pieces together, in m or square metres",
+    r"diameter_mm": "of a bolt or pin",
+    r"clamps_mm": "thickness that it holds together",
+    r"length_mm": "of a bolt or pin, with nut and washers",
+    r"bar": "number of the bar",
+    r"bar_mm": "its length",
+    r"(from|to)_mm": "where the piece begins and ends on it",
+    r"left_mm": "what is left of it",
+    r"step": "number of the step",
+    r"action": "what to do",
+    r"lamella": "number of the lamella, a row of pieces from end to end: (n) in the drawing",
+    r"elements?": "numbers of the pieces in the design: grey in the drawing",
+    r"parts": "labels of the lamella's pieces, from one end to the other",
+    r"joints?": "numbers of the joints: small and grey in the drawing",
+    r"variant": "as is, or how else the part is built in: a mirrored straight piece has its side 2 "
+    "first, a flipped corner is turned over, a mirrored cell has top and bottom changed",
+    r"place": "of the piece along its lamella, from 1",
+    r"layer": "lower or upper piece at its joint",
+    r"slot": "whether its slot opens up or down",
+    r"crosses": "number of the lamella that it crosses",
+    r"arms": "sort of the cell's arms: a, both pins on one face; b, on opposite faces",
+    r"(upper|lower)_plate": "which arms are hinged to that plate of the cell",
+    r"side_[12]": "which of the part's lengths lies first, and second, along the lamella; of a "
+    "cell, at its upper and at its lower plate",
+    r"side_[12]_mm": "how long that side is along its axis",
+    r"side_[12]_towards": "what is at its end",
+    r"turn_deg": "of a corner: by how much it turns, counter-clockwise about the joints' axes when "
+    "walking from before to after",
+    r"(before|after)": "elements that meet at the corner",
+    r"[xyz]_mm": "the place, in millimetres, as in the design's file",
+    r"(lower|upper)": "elements that cross at the joint",
+}
+
+
+def read_me(
+    title: str, blanks: Blanks, files: Sequence[Path], tables: Mapping[str, Sequence[str]]
+) -> str:
+    """The text of READ_ME.txt.
+
+    files : all that lie in the folder; tables : columns of those that are tables, by file name
+
+    Every file and every column of a table is explained; those that nothing is known of are listed
+    by name.
+    """
+    source = sources(blanks)
+    lines = [title, "", fill("All lengths are in millimetres, angles in degrees.", _WIDTH), ""]
+    for sentence in (source.note, EITHER if source.either else ""):
+        lines += [fill(sentence, _WIDTH), ""] if sentence else []
+    lines += ["FILES", ""]
+    names = {path.name: explained(path.stem, _FILES) for path in files}
+    lines += [*_entries(names), "", "COLUMNS OF THE TABLES", ""]
+    columns = dict.fromkeys(name for names in tables.values() for name in names)
+    lines += _entries({name: explained(name, _COLUMNS, whole=True) for name in columns})
+    return "\n".join([*lines, ""])
+
+
+def explained(name: str, known: Mapping[str, str], *, whole: bool = False) -> str:
+    """What a name means, by the first pattern that fits its beginning, or all of it; or ""."""
+    match = re.fullmatch if whole else re.match
+    return next((text for pattern, text in known.items() if match(pattern, name)), "")
+
+
+def _entries(texts: Mapping[str, str]) -> list[str]:
+    """Names with what they mean below, those that mean the same together."""
+    groups: dict[str, list[str]] = {}
+    for name, text in texts.items():
+        groups.setdefault(text, []).append(name)
+    lines, indent = [], "    "
+    for text, names in groups.items():
+        lines.append(fill(", ".join(names), _WIDTH, break_long_words=False))
+        if text:
+            lines.append(fill(text, _WIDTH, initial_indent=indent, subsequent_indent=indent))
+    return lines
