@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from .constraints import LinearConstraints
+from .dual import elastic_qp, solve_by_dual
 from .problem import Derivatives, Inequalities, LiftedTerm
 from .qp import QP, QPResult, QPSolver
 from .qp_backends import factorise_positive
@@ -266,37 +267,6 @@ def _steepest_penalty(model: QuadraticModel) -> float:
     return model.penalty * float(steepest @ (1 + model.excess(np.zeros(model.region.n))))
 
 
-def _elastic(model: QuadraticModel, qp: QP) -> tuple[QP, np.ndarray]:
-    """The subproblem with slacks t >= 0 of the bounds behind its unknowns, and the bounds (b,) that
-    have one.
-
-    They come at the price penalty (t + t^2 / 2), so that a step exists wherever it starts from.
-    """
-    rows = model.bounds
-    assert rows is not None
-    bounds, slack = np.unique(rows.bound, return_inverse=True)
-    m, b, size = rows.rows, len(bounds), qp.g.size
-    weight = np.full(b, model.penalty)
-    slacks = sp.csr_matrix((-np.ones(m), (np.arange(m), slack)), shape=(m, b))
-    A = sp.bmat(
-        [
-            [qp.A, sp.csr_matrix((qp.lo.size, b))],
-            [sp.hstack([rows.jacobian, sp.csr_matrix((m, size - model.region.n))]), slacks],
-        ],
-        format="csr",
-    )
-    return QP(
-        sp.csc_matrix(sp.block_diag([qp.H, sp.diags(weight)])),
-        np.append(qp.g, weight),
-        A,
-        np.append(qp.lo, np.full(m, -np.inf)),
-        np.append(qp.hi, -rows.value),
-        np.append(qp.lb, np.zeros(b)),
-        np.append(qp.ub, np.full(b, np.inf)),
-        qp.border + b,
-    ), bounds
-
-
 def _damped(
     model: QuadraticModel, damping: float, solver: QPSolver, start: Any
 ) -> ModelStep | None:
@@ -306,15 +276,16 @@ def _damped(
         weights[:n] = damping
         qp = replace(qp, H=sp.csc_matrix(qp.H + sp.diags(weights)))
     y, z = start
-    result = solver.solve(qp, (np.zeros(qp.g.size), y, np.append(z, np.zeros(qp.g.size - n))))
+    whole = np.zeros(qp.g.size), y, np.append(z, np.zeros(qp.g.size - n))
+    pressure = np.zeros(0)
+    if model.bounds is None:
+        result = solver.solve(qp, whole)
+    elif found := solve_by_dual(qp, model.bounds, model.penalty, solver):
+        result, pressure = found
+    else:
+        result, pressure = _solved_elastic(model, qp, solver, whole)
     if result.status != "solved":
         return None
-    pressure = np.zeros(0)
-    if model.bounds is not None and model.excess(result.x[:n]).max(initial=0.0) > 0:
-        found, pressure = _solved_elastic(model, qp, solver, (result.x, y, z), result.wall_s)
-        if found is None:
-            return None
-        result = found
     u = result.x[:n]
     return ModelStep(
         u,
@@ -328,24 +299,26 @@ def _damped(
 
 
 def _solved_elastic(
-    model: QuadraticModel, qp: QP, solver: QPSolver, start: Any, wall_s: float
-) -> tuple[QPResult | None, np.ndarray]:
-    """The elastic subproblem's solution without its slacks, and the bounds' multipliers (k,)."""
+    model: QuadraticModel, qp: QP, solver: QPSolver, start: Any
+) -> tuple[QPResult, np.ndarray]:
+    """The whole subproblem's solution without its slacks, and the bounds' multipliers (k,), empty
+    where none is met with."""
     rows = model.bounds
     assert rows is not None
-    if found := _solved_by_dual(model, qp, solver):
-        return found
-    elastic, bounds = _elastic(model, qp)
-    x, y, z = start
-    t = model.excess(x[: model.region.n])[bounds]
-    m, free = rows.rows, elastic.g.size - z.size
+    result = solver.solve(qp, start)
+    if result.status != "solved" or model.excess(result.x[: model.region.n]).max(initial=0) <= 0:
+        return result, np.zeros(0)
+    elastic = elastic_qp(qp, rows, model.penalty)
+    t = model.excess(result.x[: model.region.n])[np.unique(rows.bound)]
+    m, free = rows.rows, elastic.g.size - qp.g.size
+    wall_s, (_, y, z) = result.wall_s, start
     result = solver.solve(
         elastic,
-        (np.append(x, t), np.append(y, np.zeros(m)), np.append(z, np.zeros(free))),
+        (np.append(result.x, t), np.append(y, np.zeros(m)), np.append(z, np.zeros(free))),
         interior_point=True,
     )
     if result.status != "solved":
-        return None, np.zeros(0)
+        return result, np.zeros(0)
     pressure = np.zeros(rows.bound.max() + 1)
     np.add.at(pressure, rows.bound, result.y[qp.lo.size :])
     return replace(
@@ -355,61 +328,6 @@ def _solved_elastic(
         z=result.z[: qp.g.size],
         wall_s=result.wall_s + wall_s,
     ), pressure
-
-
-def _solved_by_dual(
-    model: QuadraticModel, qp: QP, solver: QPSolver
-) -> tuple[QPResult, np.ndarray] | None:
-    """The elastic subproblem by the dual one, where no other limit comes into play; else None.
-
-    With H = L L^T at hand, multipliers y >= 0 of the rows A x + c <= t minimise
-    1/2 y^T A H^-1 A^T y + (A H^-1 g - c)^T y + sum_bounds max(0, s - penalty)^2 / (2 penalty), with
-    s the sum of a bound's multipliers: some hundred unknowns instead of all parameters of all
-    designs, whose dense blocks OSQP would factorise again and again.
-    """
-    began = time.perf_counter()
-    inverse = factorise_positive(qp.H, qp.border)
-    rows = model.bounds
-    if inverse is None or rows is None:
-        return None
-    wide = np.zeros((rows.rows, qp.g.size))
-    wide[:, : model.region.n] = rows.jacobian.toarray()
-    # a row that no step changes never pushes where it is met: as an unknown of no curvature it
-    # would spoil the scale of all others
-    pushing = (rows.value > 0) | wide.any(axis=1)
-    wide, value = wide[pushing], rows.value[pushing]
-    free, columns = inverse(-qp.g), inverse(wide.T)
-    bounds, number = np.unique(rows.bound[pushing], return_inverse=True)
-    m, b = len(value), len(bounds)
-    curvature = sp.block_diag([wide @ columns, np.eye(b) / model.penalty], format="csc")
-    sums = sp.csr_matrix((np.ones(m), (number, np.arange(m))), shape=(b, m))
-    unlimited = np.full(m + b, np.inf)
-    dual = solver.solve(
-        QP(
-            sp.csc_matrix(curvature),
-            np.append(-(wide @ free) - value, np.zeros(b)),
-            sp.csr_matrix(sp.hstack([sums, -sp.identity(b)])),
-            np.full(b, -np.inf),
-            np.full(b, model.penalty),
-            np.zeros(m + b),
-            unlimited,
-        ),
-        interior_point=True,  # many rows of few parameters: OSQP takes 100 times longer, or stalls
-    )
-    if dual.status != "solved":
-        return None
-    y = dual.x[:m]
-    x = free - columns @ y
-    row = qp.A @ x
-    if not (
-        np.all(x >= qp.lb) and np.all(x <= qp.ub) and np.all(row >= qp.lo) and np.all(row <= qp.hi)
-    ):
-        return None
-    pressure = np.zeros(rows.bound.max() + 1)
-    np.add.at(pressure, rows.bound[pushing], y)
-    nothing = np.zeros(qp.lo.size), np.zeros(qp.g.size)
-    wall_s = time.perf_counter() - began
-    return replace(dual, x=x, y=nothing[0], z=nothing[1], wall_s=wall_s), pressure
 
 
 def projected_gradient(

@@ -71,7 +71,7 @@ class QPResult:
 
     status : ``solved``; or ``infeasible``, ``unbounded``, ``indefinite`` (H) or ``failed``: x and
         multipliers are void
-    solver : ``direct``, ``osqp``, ``osqp, tightened`` or ``piqp``
+    solver : ``direct``, ``osqp``, ``osqp, tightened``, ``piqp`` or ``dual``
     """
 
     x: np.ndarray
@@ -124,6 +124,11 @@ class QPSolver:
         return QPResult(
             x, y, z, raw.status, residuals, solver, raw.iterations, time.perf_counter() - began
         )
+
+    def residuals(self, qp: QP, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> Residuals:
+        """What a solution that was found otherwise leaves of the optimality conditions."""
+        scaling = _Scaling.of(qp)
+        return residuals_of(scaling.apply(qp), *scaling.into(x, y, z))
 
     def _attempts(
         self,

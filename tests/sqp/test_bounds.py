@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-import kop_exudyn.sqp.model as model_module
 from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.sqp.constraints import LinearConstraints
 from kop_exudyn.sqp.history import SQPState
@@ -105,29 +104,6 @@ def test_resumed_as_if_never_interrupted():
     again = minimise(Disc(), middle.x, OPTIONS, state=middle)
     assert np.array_equal(again.x, whole.x) and again.steps == whole.steps
     assert np.array_equal(again.pressure, whole.pressure)
-
-
-def test_the_dual_subproblem_has_the_elastic_ones_solution(monkeypatch):
-    generator = np.random.default_rng(3)
-    n, m = 30, 12
-    root = generator.standard_normal((n, n))
-    hessian = sp.csc_matrix(root @ root.T + np.eye(n))
-    bounds = Inequalities(
-        generator.uniform(-0.2, 0.5, m),
-        sp.csr_matrix(generator.standard_normal((m, n))),
-        np.repeat(np.arange(4), 3),
-    )
-    derivatives = Derivatives(generator.standard_normal(n), hessian, inequalities=bounds)
-    region = Region(np.full(n, -5.0), np.full(n, 5.0), LinearConstraints.none(n), np.ones(n))
-    model = build_model(np.zeros(n), derivatives, hessian, region, 0.7)
-    start = np.zeros(0), np.zeros(n)
-    by_dual = minimise_model(model, np.inf, QPSolver(), start)
-    monkeypatch.setattr(model_module, "_solved_by_dual", lambda *arguments: None)
-    whole = minimise_model(model, np.inf, QPSolver(), start)
-    assert np.allclose(by_dual.u, whole.u, atol=1e-7)
-    assert np.allclose(by_dual.pressure, whole.pressure, atol=1e-5)
-    assert by_dual.predicted == pytest.approx(whole.predicted, rel=1e-8)
-    assert model.excess(by_dual.u).max() > 0  # some of the bounds had to give way
 
 
 def test_a_row_that_no_step_changes_spoils_no_scale():
