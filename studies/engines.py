@@ -1,13 +1,12 @@
 """Who solves: this package's solver, Exudyn with steps controlled, Exudyn as it comes
 
-    python studies/engines.py [--quick] [--out reports/engines]
+    python studies/engines.py [--quick] [--out reports/engines] [--redraw]
 
 Every design of the models (and of the released umbrella meshes, where they lie beside the
 repository) is deployed twice from the same start: by this package's solver, and by Exudyn's
 residuals and steps (`kop simulate --engine exudyn`). How far the two states are apart is the
 largest difference of a body's coordinate, relative to the scene's size, and of a hinge's angle.
-Both states are then confirmed by Exudyn. A design of each class is also put under random forces by
-both.
+Both states are then confirmed by Exudyn. Every design is also put under random forces by both.
 
 Then one solve, from the same near start to the final state, by both and by Exudyn's static solver
 as it comes, with the quickest of the settings that a user of it would try (load steps, over which
@@ -52,7 +51,10 @@ Rows = list[dict[str, Any]]
 
 
 def main() -> None:
-    study = Study.from_command_line(__doc__, __file__)
+    study = Study.from_command_line(__doc__, __file__, can_redraw=True)
+    if study.stored is not None:
+        show(study, **{name: study.stored[name] for name in ("deployments", "loaded", "ways")})
+        return
     folders = ("small",) if study.quick else ("conformals", "grids", "umbrellas", "small")
     files = [path for folder in folders for path in design_files(MODELS / folder)]
     files = files[:1] if study.quick else [*files, *(path for path in RELEASED if path.exists())]
@@ -77,21 +79,45 @@ def main() -> None:
     loaded = [found[task.name]["loaded"] for task in tasks if "loaded" in found[task.name]]
     solves = [row for task in ways for row in found[task.name]["rows"]]
 
-    # 2. What came out.
-    report = study.report(finding(rows, loaded, solves))
+    show(study, rows, loaded, solves, {"runs": runs, "fine": fine})
+
+
+def show(
+    study: Study,
+    deployments: Rows,
+    loaded: Rows,
+    ways: Rows,
+    settings: dict[str, int] | None = None,
+) -> None:
+    """What came out: the page and its data."""
+    report = study.report(finding(deployments, loaded, ways))
     report.section("Deployments").figure(
         "deployments",
-        drawing(rows),
-        "Processor seconds of a full deployment by either engine, and of a confirmation.",
+        drawing(deployments),
+        "Processor seconds of a full deployment by this package's solver and by Exudyn's residuals "
+        "and steps, and of a confirmation by Exudyn's static solver.",
         alt="seconds by design of both engines",
-    ).table("deployments", rows, "apart: relative to the scene's size")
-    report.section("Under forces").table("loaded", loaded, "apart: relative to the size")
+    ).table(
+        "deployments",
+        deployments,
+        "Fast: this package's solver; exudyn: Exudyn's residuals and steps; s: processor seconds. "
+        "Apart: the two states, relative to the scene's size; angles: of hinges. Confirmation: "
+        "Exudyn's static solver, from the state that is confirmed.",
+    )
+    report.section("Under forces").table(
+        "loaded",
+        loaded,
+        "Forces: how many joints have one. Deflection: the largest, in % of the size. Apart: the "
+        "two states under them, relative to the size.",
+    )
     report.section("One solve three ways").table(
-        "ways", solves, "Exudyn's error is that of its own positions; without one, it failed"
+        "ways",
+        ways,
+        "Seconds: median of the runs, least and most beside it. Error: largest distance of a joint "
+        "from the same design with more elements, in % of the size; Exudyn's is that of its own "
+        "positions, and without one it found no equilibrium.",
     )
-    report.save(
-        {"deployments": rows, "loaded": loaded, "ways": solves}, {"runs": runs, "fine": fine}
-    )
+    report.save({"deployments": deployments, "loaded": loaded, "ways": ways}, settings)
 
 
 def finding(rows: Rows, loaded: Rows, solves: Rows) -> str:
@@ -108,9 +134,11 @@ def finding(rows: Rows, loaded: Rows, solves: Rows) -> str:
         < next(other["seconds"] for other in solves if other["design"] == row["design"])
     ]
     times = f" in {ratios[0]:.0f} to {ratios[-1]:.0f} times the time" if ratios else ""
+    apart = max((row["apart"] for row in (*same, *held)), default=0.0)
     return (
-        f"Exudyn deploys {len(same)} of {len(rows)} designs to this package's states, at most "
-        f"{SAME:g} of their size apart{times}, and {len(held)} of {len(loaded)} under forces. "
+        f"Exudyn deploys {len(same)} of {len(rows)} designs to this package's states{times}, and "
+        f"{len(held)} of {len(loaded)} under forces; these states are at most {apart:.1g} of the "
+        "size apart. "
         f"Exudyn's static solver as it comes, with the best of its settings, solves {len(there)} "
         f"of {len(alone)} near ones; it is quicker than this package's solver for "
         f"{', '.join(quicker) if quicker else 'none'}."
@@ -120,19 +148,23 @@ def finding(rows: Rows, loaded: Rows, solves: Rows) -> str:
 def drawing(rows: Rows) -> Figure:
     """Seconds by design, on a logarithmic axis."""
     with style():
-        figure, axes = plt.subplots(figsize=(7, 0.24 * len(rows) + 1.2))
+        figure, axes = plt.subplots(figsize=(7, 0.24 * len(rows) + 1.2), layout="constrained")
         for place, row in enumerate(rows):
-            shown = (("fast s", 0), ("exudyn s", 1), ("confirmation s", 2))
-            for key, colour in shown:
+            shown = (
+                ("fast s", "this package's solver"),
+                ("exudyn s", "Exudyn's residuals and steps"),
+                ("confirmation s", "confirmation by Exudyn"),
+            )
+            for colour, (key, name) in enumerate(shown):
                 if key in row:
-                    label = key.removesuffix(" s") if place == 0 else None
+                    label = name if place == 0 else None
                     axes.plot(row[key], place, "o", color=CYCLE[colour], label=label)
         axes.set_yticks(range(len(rows)), [row["design"] for row in rows])
         axes.invert_yaxis()
         axes.set_xscale("log")
         axes.set_xlabel("processor seconds")
         axes.grid(axis="x", color=FAINT)
-        axes.legend()
+        figure.legend(loc="outside upper left", ncols=3)
     return figure
 
 

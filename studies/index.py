@@ -25,7 +25,7 @@ STORY = (
     Chapter("project_new_design", "A new design from a kit that exists"),
     Chapter("slit_parts", "Adjustable parts bring kits down to a handful"),
     Chapter("robustness", "What the workshop's errors do"),
-    Chapter("engines", "Every state is confirmed by Exudyn"),
+    Chapter("engines", "Every state that is kept is confirmed by Exudyn"),
     Chapter("stress", "It holds under conditions worse than any user's"),
 )
 

@@ -85,7 +85,9 @@ def main() -> None:
         f"equilibria, "
         f"{whole.get('sensitivities', 0.0) / total:.0%} their sensitivities, "
         f"{whole.get('QP', 0.0) / total:.0%} "
-        f"quadratic programs, {whole.get('Exudyn', 0.0) / total:.0%} Exudyn; a step takes "
+        f"quadratic programs, {whole.get('target fitting', 0.0) / total:.0%} distances to targets, "
+        f"{whole.get('Exudyn', 0.0) / total:.0%} Exudyn, and {whole.get('rest', 0.0) / total:.0%} "
+        f"all the rest; a step takes "
         + " and ".join(
             f"{m['all']:.1f} s and {m['equilibria']:.0f} equilibria in the {stage} stage"
             for stage, m in typical.items()
@@ -107,7 +109,8 @@ def main() -> None:
         "phases",
         rows,
         "The whole run, and the median of an accepted step. Equilibria are assembly, "
-        "factorisation and the rest of Newton's method.",
+        "factorisation and the rest of Newton's method. Rest: everything that none of these "
+        "clocks is around.",
     )
     report.save(
         {"finding": finding, "phases": rows, "medians": typical, "equilibria": outcome.equilibria},

@@ -128,7 +128,7 @@ def finding_of(cases: Sequence[Case]) -> str:
     text = (
         f"In {len(failed)} of {len(cases)} cases the design fails on the way to its parts "
         f"({len(failed) - without} snap, {without} find no equilibrium); raising w_c as the search "
-        f"does rescues {saved} of them."
+        f"does rescues {saved} of them, {_nearer(failed)} of which then end nearer to the target."
     )
     shown = example(cases)
     if shown is None or not shown["snapped"]:
@@ -144,6 +144,15 @@ def finding_of(cases: Sequence[Case]) -> str:
     return (
         f"{text}; with {_in_words(rescue)} it stays in its state and ends "
         f"{rescue['at the parts %']:.1f} % off."
+    )
+
+
+def _nearer(failed: Sequence[Case]) -> int:
+    """How many of the rescued cases are nearer to the target at their parts than before."""
+    return sum(
+        not fails(case["rescue"])
+        and case["rescue"]["at the parts %"] < case.get("at the parts %", float("inf"))
+        for case in failed
     )
 
 

@@ -18,6 +18,8 @@ import logging
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from datetime import date
+from functools import cached_property
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -52,6 +54,8 @@ class Study:
     quick : the smallest settings that show that it works
     jobs : processes; scheduler : address of a Dask scheduler, or None
     resume : keep the results that an interrupted run left in `out`
+    redraw : make the page anew from the data beside it, without computing anything; for studies
+        that ask for `stored`
     kits_s : seconds that each kit took which several studies share, whether in this run or in an
         earlier one
     """
@@ -63,6 +67,7 @@ class Study:
     jobs: int = 1
     scheduler: str | None = None
     resume: bool = False
+    redraw: bool = False
     results: dict[str, TaskResult] = field(default_factory=dict)
     computed: set[str] = field(default_factory=set)
     kits_s: dict[str, float] = field(default_factory=dict)
@@ -71,10 +76,17 @@ class Study:
 
     @classmethod
     def from_command_line(
-        cls, doc: str, file: str | Path, arguments: Sequence[str] | None = None
+        cls,
+        doc: str,
+        file: str | Path,
+        arguments: Sequence[str] | None = None,
+        *,
+        can_redraw: bool = False,
     ) -> Study:
         """The study of a script: its docstring, its `__file__`, and the arguments (default: the
         program's).
+
+        can_redraw : whether its page needs no more than its data: it then has the option --redraw
 
         Raises InputError when the folder can't be written to.
         """
@@ -104,17 +116,30 @@ class Study:
         parser.add_argument(
             "--resume", action="store_true", help="go on where an interrupted run stopped"
         )
+        if can_redraw:
+            parser.add_argument(
+                "--redraw",
+                action="store_true",
+                help="make the page anew from its data.json, with the times and versions there",
+            )
         return cls(title, about, **vars(parser.parse_args(arguments))).started()
 
     def started(self) -> Study:
         """The same study with its folder made ready."""
         make_folder(self.out)
+        if self.redraw:
+            return self
         clock = self.out / _SWEEP / _CLOCK
         if not self.resume:
             SweepStore(self.out / _SWEEP).clear()
         elif clock.exists():
             self._earlier_s = float(read_json(clock)["wall_s"])
         return self
+
+    @cached_property
+    def stored(self) -> Mapping[str, Any] | None:
+        """With `redraw`, the data of the report that is there; else None."""
+        return read_json(self.out / "data.json") if self.redraw else None
 
     @property
     def reused(self) -> int:
@@ -222,54 +247,63 @@ class StudyReport:
         the page's path.
 
         settings : of the study; default: those of its tasks
+
+        Of a page that is drawn anew, settings, times, versions and machine are those of the data.
         """
         study = self.study
-        settings = settings or {name: result.described for name, result in study.results.items()}
-        times = {
-            "wall_s": study.wall_s,
-            "tasks": len(study.results),
-            "tasks_s": sum(result.seconds for result in study.results.values()),
-            "kits_s": study.kits_s,
+        made = {
+            "settings": settings
+            or {name: result.described for name, result in study.results.items()},
+            "times": {
+                "wall_s": study.wall_s,
+                "tasks": len(study.results),
+                "tasks_s": sum(result.seconds for result in study.results.values()),
+                "reused": study.reused,
+                "kits_s": study.kits_s,
+            },
+            "environment": environment(),
         }
+        if study.stored is not None:
+            made = {name: study.stored[name] for name in made}
+            made["redrawn"] = date.today().isoformat()
         write_json(
             study.out / "data.json",
             {
                 "study": study.title,
-                "quick": study.quick,
+                "quick": study.quick if study.stored is None else study.stored["quick"],
                 "finding": self.finding,
                 **data,
-                "settings": settings,
-                "times": times,
-                "environment": environment(),
+                **made,
             },
             overwrite=True,
         )
-        self.page.section("How it was made", self._times(times))
-        self.page.details("Settings", settings).details("Versions and machine", environment())
+        self.page.section("How it was made", self._times(made))
+        self.page.details("Settings", made["settings"])
+        self.page.details("Versions and machine", made["environment"])
         return self.page.save(study.out / "index.html", overwrite=True)
 
-    def _times(self, times: Mapping[str, Any]) -> str:
-        study = self.study
-        setting = "Quick settings" if study.quick else "Full settings"
+    def _times(self, made: Mapping[str, Any]) -> str:
+        times, kits_s = made["times"], made["times"].get("kits_s") or {}
+        setting = "Quick settings" if self.study.quick else "Full settings"
         sweep = (
             f"; {times['tasks']} tasks of {times['tasks_s']:.0f} s in all" if times["tasks"] else ""
         )
-        reused = f", {study.reused} of them computed earlier" if study.reused else ""
+        reused = f", {times['reused']} of them computed earlier" if times.get("reused") else ""
         kits = (
-            (
-                f" Its {len(study.kits_s)} kits took {sum(study.kits_s.values()):.0f} s, once for "
-                f"all studies that "
-                "look at them."
-            )
-            if study.kits_s
+            f" Its {len(kits_s)} kits took {sum(kits_s.values()):.0f} s, once for all studies that "
+            "look at them."
+            if kits_s
+            else ""
+        )
+        redrawn = (
+            f" The page was drawn anew from these numbers on {made['redrawn']}."
+            if "redrawn" in made
             else ""
         )
         return (
-            f"{setting}, {times['wall_s']:.0f} s of wall time on {environment()['cores']} "
-            f"cores{sweep}{reused}."
-            f"{kits} Drawings are beside this page as PDF files, the smaller ones as SVG too, its "
-            f"numbers in "
-            "data.json and CSV files."
+            f"{setting}, {times['wall_s']:.0f} s of wall time on {made['environment']['cores']} "
+            f"cores{sweep}{reused}.{kits} Drawings are beside this page as PDF files, the smaller "
+            f"ones as SVG too, its numbers in data.json and CSV files.{redrawn}"
         )
 
 

@@ -104,6 +104,31 @@ def test_other_sweeps_lend_their_results(tmp_path):
     assert found == {"square 2": {"square": 4.0}} and calls == [1, 2, 3]
 
 
+def test_a_page_is_drawn_anew_from_its_data_alone(tmp_path):
+    """With the times, versions and machine of the run, and a word that it was."""
+    run(tmp_path)
+    out = tmp_path / "reports" / "squares"
+    data = json.loads((out / "data.json").read_text())
+    data["environment"]["commit"], data["times"]["wall_s"] = "0123456789", 4321.0
+    data["times"]["reused"] = 2
+    (out / "data.json").write_text(json.dumps(data))
+    kept = sorted(path.name for path in (out / "sweep").iterdir())
+    file = tmp_path / "studies" / "squares.py"
+    study = Study.from_command_line(DOC, file, ["--redraw"], can_redraw=True)
+    assert study.stored == data
+    study.report("They grow fast.").save({"squares": study.stored["squares"]})
+    page, again = (out / "index.html").read_text(), json.loads((out / "data.json").read_text())
+    assert '<p class="lead">They grow fast.</p>' in page and "They grow.<" not in page
+    assert "4321 s of wall time" in page and "0123456789" in page
+    assert "2 of them computed earlier" in page and "drawn anew from these numbers on" in page
+    assert again["finding"] == "They grow fast." and again["squares"] == data["squares"]
+    for name in ("settings", "times", "environment", "quick"):
+        assert again[name] == data[name]
+    assert sorted(path.name for path in (out / "sweep").iterdir()) == kept
+    with pytest.raises(SystemExit):  # of a study whose page needs more than its data
+        Study.from_command_line(DOC, file, ["--redraw"])
+
+
 def test_unusable_folders_and_arguments_are_refused(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="expected a folder"):
