@@ -187,8 +187,8 @@ def is_found(outcome: Any) -> bool:
 
 
 def finding(rows: list[dict[str, Any]]) -> str:
-    """What the rows say, in a sentence a level."""
-    sentences = []
+    """What the rows say: what all of it together costs and gains, then a sentence a level."""
+    sentences = _in_all(rows)
     for level in dict.fromkeys(row["required"] for row in rows):
         own = [row for row in rows if row["required"] == level]
         opened = [row["opened max %"] for row in own if row["opened max %"] is not None]
@@ -214,6 +214,30 @@ def finding(rows: list[dict[str, Any]]) -> str:
             f"{''.join(f', {one}' for one in more)}."
         )
     return " ".join(sentences)
+
+
+def _in_all(rows: list[dict[str, Any]]) -> list[str]:
+    """A sentence on the last level against the first one; none where there is one only."""
+    levels = list(dict.fromkeys(row["required"] for row in rows))
+    if len(levels) < 2:
+        return []
+    without, with_all = (
+        [row for row in rows if row["required"] == level] for level in (levels[0], levels[-1])
+    )
+    medians = []
+    for own in (without, with_all):
+        opened = [row["opened max %"] for row in own if row["opened max %"] is not None]
+        medians.append(f"{np.median(opened):.2g} %" if opened else "nowhere")
+    text = (
+        f"Where all is required, {sum(row['opens'] for row in with_all)} of {len(with_all)} "
+        f"designs open into the state shown instead of {sum(row['opens'] for row in without)}, "
+        f"and the median of their largest deviation, as they open, is {medians[1]} of the target "
+        f"instead of {medians[0]}"
+    )
+    snapped = [sum(row["snapped"] or 0 for row in own) for own in (without, with_all)]
+    tried = sum(row["samples"] or 0 for row in with_all)
+    snaps = f"; {snapped[1]} of {tried} samples snap instead of {snapped[0]}" if tried else ""
+    return [f"{text}{snaps}."]
 
 
 def draw_costs(rows: list[dict[str, Any]]) -> Figure:

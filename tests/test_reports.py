@@ -35,7 +35,6 @@ MADE = sorted(
 def test_page_and_tables_are_those_of_the_data(name):
     data = _data(REPORTS / name)
     assert not data["quick"]
-    page = _text((REPORTS / name / "index.html").read_text(encoding="utf-8"))
     if "finding" in data:
         html = (REPORTS / name / "index.html").read_text(encoding="utf-8")
         first = re.search(r"<h1>.*?</h1>\s*<p[^>]*>(.*?)</p>", html, re.DOTALL)

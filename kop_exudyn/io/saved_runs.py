@@ -49,7 +49,14 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
     """
     folder = Path(folder)
     path = folder / "result.json"
-    data, states = load_result(path), load_states(folder / "states.npz")
+    data = load_result(path)
+    if not (folder / "states.npz").exists():
+        raise InputError(
+            "no such file: reports that are kept without the states of their designs can be read, "
+            "but not taken further; kop optimize makes them again",
+            source=folder / "states.npz",
+        )
+    states = load_states(folder / "states.npz")
     designs = _named(designs, [design["name"] for design in data["designs"]], path)
     kit = Kit.from_dict(data["kit"], source=str(path))
     designs = served_by(designs, kit.sizes)
@@ -297,6 +304,9 @@ def saved_equilibrium(
     found = solve(design.systems[role.name], q, Start(state, torque), role.opening)
     if np.abs(found.state.positions - state.positions).max() > _SAME_PLACE * scene.size:
         raise InputError(
-            "the saved states are no equilibria of this design", source=design.name, field=stage
+            "the saved states are no equilibria of this design: its file has been changed since, "
+            "or the program has; kop optimize makes them again",
+            source=design.name,
+            field=stage,
         )
     return found

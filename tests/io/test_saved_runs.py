@@ -172,5 +172,5 @@ def test_changed_designs_are_noticed(finished, shells):
     with pytest.raises(InputError, match="another version"):
         load_run(folder, changed)
     wider = [type(d)(d.name, d.network, d.model, 1.3 * d.opening) for d in shells]
-    with pytest.raises(InputError, match="no equilibria"):
+    with pytest.raises(InputError, match="no equilibria of this design: its file has been changed"):
         load_run(folder, wider)
