@@ -3,7 +3,7 @@
     python studies/kit_size_tradeoff.py [--quick] [--out DIR] [--jobs N] [--scheduler ADDRESS]
     [--resume]
 
-Kits of several sizes are found by what `kop tradeoff` calls, for conformals 1 to 5 (2 to 25 linear
+Kits of several sizes are found by what kop tradeoff calls, for conformals 1 to 5 (2 to 25 linear
 and 5 angular parts), six umbrella meshes (1 to 12 cells) and six grids (1 to 12 linear and 5
 angular parts). The largest kit is sought from scratch, in both stages; every other one by merging
 parts of the next larger one, in two rounds of exchanges and without leaps. A kit that is worse than
@@ -30,12 +30,25 @@ from matplotlib.figure import Figure
 
 from kop_exudyn.analysis.tradeoff import knee
 from kop_exudyn.drawing.style import PALETTE, style
-from kop_exudyn.report.tradeoff_drawing import draw_tradeoff
+from kop_exudyn.report.tradeoff_drawing import draw_tradeoff, plain_log
 from lib.size_kits import KeptKit, SizedCase, compared_tasks, kits_by_size, sized_cases
 from lib.study import Study
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
 OTHERS = {"direct": "direct projection", "published": "published method"}
+COLUMNS = (
+    "pieces",
+    "kit size %",
+    "max %",
+    "mean %",
+    "open as shown",
+    "direct max %",
+    "published max %",
+    "energy ratio",
+    "J",
+    "from",
+    "seconds",
+)
 MARKS = {"direct": ("x", "orange"), "published": ("+", "black")}
 
 
@@ -105,7 +118,7 @@ def write(study: Study, found: Sequence[Found], missing: Sequence[str]) -> None:
         )
         report.table(
             f"kits_{name}" if len(found) + len(missing) > 1 else "kits",
-            one.rows,
+            [{name: row[name] for name in (kind, *COLUMNS)} for row in one.rows],
             "max and mean: of the joints' deviations; energy ratio: mean over the designs; J: the "
             "objective; from: the kit whose parts were split or merged; seconds: of the search "
             "that gave the kit; direct and published: largest deviation of the designs as they "
@@ -167,6 +180,7 @@ def drawn(one: Found) -> Figure:
             known = [point for point in points if point[1] is not None]
             if known:
                 panel.plot(*zip(*known), mark, color=PALETTE[colour], label=told, markersize=7)
+        plain_log(panel)
         if len(panel.get_legend_handles_labels()[0]) > 3:
             own = [*zip(*panel.get_legend_handles_labels())][3:]
             panel.legend(*zip(*own), loc="upper right")

@@ -35,6 +35,7 @@ from kop_exudyn.files.tables import write_csv
 from kop_exudyn.provenance import usable_cores
 from kop_exudyn.report.environment import environment
 from kop_exudyn.report.page import Page
+from kop_exudyn.wording import counted
 
 from .sweep import Task, TaskResult, run_sweep
 from .sweep_store import SweepStore
@@ -286,7 +287,9 @@ class StudyReport:
         times, kits_s = made["times"], made["times"].get("kits_s") or {}
         setting = "Quick settings" if self.study.quick else "Full settings"
         sweep = (
-            f"; {times['tasks']} tasks of {times['tasks_s']:.0f} s in all" if times["tasks"] else ""
+            f"; {counted(times['tasks'], 'task')} of {times['tasks_s']:.0f} s in all"
+            if times["tasks"]
+            else ""
         )
         reused = f", {times['reused']} of them computed earlier" if times.get("reused") else ""
         kits = (
