@@ -13,6 +13,8 @@ from matplotlib.ticker import MaxNLocator
 
 from ..drawing.style import CYCLE, INK, QUIET, style
 
+_LABEL = 8.0  # points, of the stretches' labels
+_PANELS = 0.85  # of a figure's width, that its panels have
 _SHOWN = 1e-7  # of the largest value drawn; smaller ones would only stretch the axis
 
 
@@ -65,8 +67,9 @@ def draw_history(histories: Sequence[History]) -> Figure:
         panels = figure.subplots(
             1, len(histories), sharey=True, width_ratios=widths, squeeze=False
         )[0]
-        for ax, history in zip(panels, histories):
-            _draw_stage(ax, history, colours)
+        for ax, history, width in zip(panels, histories, widths):
+            share = _PANELS * 72 * figure.get_figwidth() * width / sum(widths)
+            _draw_stage(ax, history, colours, share)
         panels[0].set_yscale("log")
         panels[0].set_ylabel("objective and its terms")
         _limit_below(panels[0], histories)
@@ -79,7 +82,8 @@ def draw_history(histories: Sequence[History]) -> Figure:
     return figure
 
 
-def _draw_stage(ax: Axes, history: History, colours: Mapping[str, str]) -> None:
+def _draw_stage(ax: Axes, history: History, colours: Mapping[str, str], width: float) -> None:
+    """width : of the panel, about, in points"""
     ax.set_title(history.title)
     ax.set_xlabel("accepted steps")
     ax.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
@@ -107,7 +111,7 @@ def _draw_stage(ax: Axes, history: History, colours: Mapping[str, str]) -> None:
         markersize=3.5,
         linewidth=2.2,
     )
-    _mark_stretches(ax, history)
+    _mark_stretches(ax, history, width / count)
 
 
 def _broken(steps: Sequence[HistoryStep], name: str | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -123,20 +127,25 @@ def _broken(steps: Sequence[HistoryStep], name: str | None = None) -> tuple[np.n
     return np.array(places), np.array(values)
 
 
-def _mark_stretches(ax: Axes, history: History) -> None:
-    """A line between the steps of two SQPs, and what each was for at the top of its stretch."""
-    first = 1
+def _mark_stretches(ax: Axes, history: History, step: float) -> None:
+    """A line between the steps of two SQPs, and what each was for at the top of its stretch; of
+    stretches so short that their labels would cover each other, the first ones are named.
+
+    step : points of paper between two steps
+    """
+    first, free = 1, 0.0
     for label, run in groupby(history.steps, key=lambda step: step.stretch):
         count = len(list(run))
-        if label:
-            if first > 1:
-                ax.axvline(first - 0.5, color=QUIET, linewidth=0.9, linestyle=(0, (4, 3)), zorder=0)
+        if label and first > 1:
+            ax.axvline(first - 0.5, color=QUIET, linewidth=0.9, linestyle=(0, (4, 3)), zorder=0)
+        if label and first >= free:
+            free = first + 1.3 * _LABEL / step
             ax.text(
                 first - 0.5 + 0.008 * len(history.steps),
                 0.985,
                 label,
                 color=QUIET,
-                size=8,
+                size=_LABEL,
                 transform=ax.get_xaxis_transform(),
                 va="top",
                 rotation=90 if count < 0.25 * len(history.steps) else 0,

@@ -3,6 +3,7 @@
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PathCollection
 
 from kop_exudyn.drawing.style import deviation_colours, figure_bytes, save_figure
@@ -107,6 +108,18 @@ class TestHistory:
         marks = [line for line in ax.lines if len(line.get_xdata()) == 2]
         assert [line.get_xdata()[0] for line in marks] == [3.5]
         assert [t.get_text() for t in ax.texts] == ["$w_c$ = $10^{3}$", "$w_c$ = 20000"]
+
+    def test_labels_of_short_stretches_do_not_cover_each_other(self):
+        """Rounds of one step each: every line is drawn, those labels are left out that would."""
+        rounds = [HistoryStep({"fit": 1.0}, round=200 + k) for k in range(40)]
+        long = [HistoryStep({"fit": 1.0}, round=1)] * 30
+        figure = draw_history([History("relaxed", self.steps), History("assigned", long + rounds)])
+        renderer = FigureCanvasAgg(figure).get_renderer()
+        figure.draw(renderer)
+        ax = figure.axes[1]
+        boxes = sorted((t.get_window_extent(renderer) for t in ax.texts), key=lambda box: box.x0)
+        assert all(a.x1 <= b.x0 for a, b in zip(boxes, boxes[1:])) and 5 < len(boxes) < 40
+        assert len([line for line in ax.lines if len(line.get_xdata()) == 2]) == 40
 
     def test_stages_with_other_terms_or_no_steps(self):
         assigned = History("assigned", [HistoryStep({"fit": 0.5})])
