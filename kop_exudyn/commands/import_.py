@@ -165,7 +165,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "the points of polylines, or keep their corners (default: %(default)s)",
     )
     shell.add_argument(
-        "--free-ends", action="store_true", help="keep the rods' ends beyond their last joint"
+        "--free-ends", action="store_true", help="of a C-shell: keep the rods' ends beyond their last joint"
     )
     shell.add_argument(
         "--layer",
@@ -293,6 +293,7 @@ def run(args: argparse.Namespace) -> int:
 def _drawing(args: argparse.Namespace, wanted: str, net: NetClass) -> int:
     """A design of a drawn net; its preview also where no design comes of it."""
     from ..errors import InputError
+    from ..exchange.free_ends import free_end_doubts
     from ..exchange.imports import read_scaled
     from ..exchange.space_nets import with_heights_checked
     from ..units import Units
@@ -309,16 +310,17 @@ def _drawing(args: argparse.Namespace, wanted: str, net: NetClass) -> int:
         if made is None and not drawn.frame.flat and args.surface is None:
             drawn = with_heights_checked(drawn)
     except InputError as error:
-        error = by_option(error.at(args.file))
+        error = _keeping_ends(by_option(error.at(args.file)), _ends_kept_by(net))
         if args.preview is not None:
-            _save_preview(args, drawn, drawn.findings, units, refused=str(error))
+            _save_preview(args, net, drawn, drawn.findings, units, refused=str(error))
         raise error from None
     findings = drawn.findings if made is None else made.findings
     if made is not None:
         drawn = made.drawn
         _write(args, made)
+    findings = [*findings, *free_end_doubts(drawn, units, _ends_kept_by(net))]
     if args.preview is not None:
-        _save_preview(args, drawn, findings, units)
+        _save_preview(args, net, drawn, findings, units)
     _tell(args, wanted, net, drawn, findings, units)
     return 0
 
@@ -363,8 +365,25 @@ def _write(args: argparse.Namespace, made: Imported) -> None:
     write_json(args.out, made.data, overwrite=args.overwrite)
 
 
+def _ends_kept_by(net: NetClass) -> str:
+    """The option that keeps free ends; "" where designs of the class have none."""
+    return "--free-ends" if "free_ends" in net.options else ""
+
+
+def _keeping_ends(error: InputError, kept_by: str) -> InputError:
+    """The error, with the option by which there would be none."""
+    from ..errors import InputError
+    from ..geometry.network import NOTHING_LEFT
+
+    if not kept_by or NOTHING_LEFT not in error.message:
+        return error
+    message = error.message.replace(NOTHING_LEFT, f"{NOTHING_LEFT} ({kept_by} keeps them)")
+    return InputError(message, source=error.source, field=error.field, value=error.value)
+
+
 def _save_preview(
     args: argparse.Namespace,
+    net: NetClass,
     drawn: DrawnNetwork,
     findings: Sequence[Finding],
     units: Units | None,
@@ -374,7 +393,8 @@ def _save_preview(
     from ..report.import_preview import net_preview
 
     figures = import_figures(drawn, units)
-    rows = import_rows(figures, list(findings), units, args.opening)
+    kept = _ends_kept_by(net)
+    rows = import_rows(figures, list(findings), units, args.opening, ends_kept_by=kept)
     page = net_preview(args.file.name, drawn, rows, findings, units, refused)
     page.save(args.preview, overwrite=args.overwrite)
 
@@ -401,7 +421,8 @@ def _tell(
         "findings": told,
     }
     opening = args.opening if "opening" in net.options else None
-    tell(args, data, import_rows(figures, list(findings), units, opening))
+    kept = _ends_kept_by(net)
+    tell(args, data, import_rows(figures, list(findings), units, opening, ends_kept_by=kept))
 
 
 def _require(args: argparse.Namespace, net: NetClass, *names: str) -> None:

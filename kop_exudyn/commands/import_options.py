@@ -29,7 +29,6 @@ _FOR = {
         "section",
         "material",
         "curves",
-        "free_ends",
         "layer",
         "join",
         "largest_part",

@@ -229,9 +229,7 @@ def _exploded(
     for entity in entities:
         if entity.dxftype() == "ATTDEF":  # a form, which insertions fill in
             continue
-        count[0] += 1
-        if count[0] > _MOST_ENTITIES:
-            raise InputError(f"draws more than {_MOST_ENTITIES:,} entities, blocks included")
+        _add(count, 1)
         # entities that only the drawing's program knows have no layer
         own = entity.dxf.layer if entity.dxf.is_supported("layer") else ""
         of_outer = outer is not None and (own == "0" or outer.layer.lower() in frozen)
@@ -249,6 +247,11 @@ def _exploded(
         if depth == _DEEPEST:
             raise InputError(f"has blocks within blocks, more than {_DEEPEST} deep")
         name = f" of block {entity.dxf.name}"
+        # an array is refused before it is spread out: of nothing, it would never end
+        contents = len(entity.block())
+        if not contents:
+            continue
+        _add([*count], entity.mcount * contents)
         for single in entity.multi_insert() if entity.mcount > 1 else (entity,):
             matrix = single.matrix44()
             matrix = matrix if placed.matrix is None else matrix * placed.matrix
@@ -256,6 +259,13 @@ def _exploded(
             clips = placed.clips if clip is None else (*placed.clips, clip)
             inner = replace(placed, matrix=matrix, clips=clips)
             yield from _exploded(entity.block(), frozen, inner, name, depth + 1, count)
+
+
+def _add(count: list[int], more: int) -> None:
+    """Count entities in place. Raises InputError where there are too many."""
+    count[0] += more
+    if count[0] > _MOST_ENTITIES:
+        raise InputError(f"draws more than {_MOST_ENTITIES:,} entities, blocks included")
 
 
 def _elsewhere(insert: Any) -> bool:

@@ -11,6 +11,7 @@ from ..units import Units, plain_number, with_unit
 from ..wording import counted
 from .drawing import Finding
 from .drawn_networks import DrawnNetwork, network_summary
+from .free_ends import cut_ends
 
 _SHOWN = 4  # findings of a kind that are told one by one
 
@@ -27,9 +28,12 @@ def import_figures(drawn: DrawnNetwork, units: Units | None) -> dict[str, Any]:
         "origin": drawn.placed.get("origin"),
     }
     try:
-        return found | dict(network_summary(drawn.network))
+        network = drawn.network
     except InputError as error:
         return found | {"refused": str(error)}
+    cut, _ = cut_ends(network)
+    ends = {"cut_ends": len(cut), "longest_cut_end": float(cut.max()) if len(cut) else None}
+    return found | dict(network_summary(network)) | ends
 
 
 def import_rows(
@@ -37,10 +41,13 @@ def import_rows(
     findings: list[Finding],
     units: Units | None,
     opening: float | None = None,
+    *,
+    ends_kept_by: str = "",
 ) -> list[tuple[str, str]]:
     """For people: rows of a name and a text.
 
     opening : rad, of a C-shell
+    ends_kept_by : the option that keeps free ends, where the class has one
     """
     of = "of" if figures["curves"] <= figures["pieces"] else "made of"
     rows = [("curves", f"{figures['curves']} {of} {counted(figures['pieces'], 'drawn piece')}")]
@@ -53,6 +60,11 @@ def import_rows(
             rows.append(
                 ("spans", f"{figures['spans']} of {shortest} to {longest}, median {median}")
             )
+        if figures["cut_ends"]:
+            longest = with_unit(figures["longest_cut_end"], "length", units)
+            how = f" ({ends_kept_by} keeps them)" if ends_kept_by else ""
+            text = f"{counted(figures['cut_ends'], 'end')} beyond the last joints, of up to "
+            rows.append(("free ends", f"{text}{longest}, cut off{how}"))
         rows.append(("size", with_unit(figures["size"], "length", units, 4)))
         if figures["mean_angle_deg"] is not None and opening is not None:
             now = figures["mean_angle_deg"]

@@ -57,6 +57,11 @@ def edges_of(path: Path) -> Drawing:
     ]
     unit, doubts = said_unit(content) if suffix == ".obj" else (None, [])
     kept = [curve for curve in curves if np.ptp(curve.points, axis=0).any()]
+    if not kept:
+        raise InputError(
+            f"all its {len(pairs):,} edges are without length: have its nodes no coordinates?",
+            source=path,
+        )
     return Drawing(kept, unit, None if unit is None else LENGTHS[unit], doubts=doubts)
 
 

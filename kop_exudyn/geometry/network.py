@@ -16,6 +16,7 @@ from .curves import Curve, curve_from_dict, direction
 _RIGHT = np.radians(0.5)  # means of angles this close to 90 degrees count as right ones
 _EQUAL = 1e-3  # mean difference of directions (their doubled cosines) that tells nothing
 _LEAST_LOOP = 3  # joints: two corners can't close a loop of straight pieces
+NOTHING_LEFT = "nothing is left of a curve with one joint when its free ends are cut off"
 
 
 @dataclass(frozen=True)
@@ -163,12 +164,13 @@ def network_from_dict(data: Mapping[str, Any]) -> CurveNetwork:
     Up to version 1 of the files the first curve was of the first family, whatever the shape.
     """
     curves = [curve_from_dict(entry, f"curves[{k}]") for k, entry in enumerate(data["curves"])]
-    return network(
-        curves,
-        data.get("crossings", "find"),
-        bool(data.get("free_ends", False)),
-        acute=data.get("version", 1) > 1,
-    )
+    crossings, free_ends = data.get("crossings", "find"), bool(data.get("free_ends", False))
+    try:
+        return network(curves, crossings, free_ends, acute=data.get("version", 1) > 1)
+    except InputError as error:
+        if error.message == NOTHING_LEFT:
+            raise InputError(f"{NOTHING_LEFT} (free_ends keeps them)", field=error.field) from None
+        raise
 
 
 def acute_first(network: CurveNetwork) -> CurveNetwork:
@@ -250,11 +252,7 @@ def _strand(curve: Curve, own: Sequence[tuple[float, int]], free_ends: bool) -> 
             field=curve.field,
         )
     if len(own) == 1 and not free_ends:
-        raise InputError(
-            "nothing is left of a curve with one joint when its free ends are cut off (free_ends "
-            "keeps them)",
-            field=curve.field,
-        )
+        raise InputError(NOTHING_LEFT, field=curve.field)
     head, tail = (
         (0.0, 0.0) if curve.closed or not free_ends else (stations[0], curve.length - stations[-1])
     )

@@ -63,6 +63,7 @@ class ObjCurve:
 # surfaces in free form, curves on them, and points, which nothing here uses
 _OTHER_ELEMENTS = ("p", "curv2", "surf")
 _FREE_FORMS = ("bspline", "bezier")
+_WHOLE_AS_FRACTION = re.compile(r"\.0*$")
 
 
 def parse_obj(content: bytes) -> ObjContent:
@@ -186,9 +187,9 @@ def _whole(text: str, place: str) -> int:
 
 def _index(text: str, n_vertices: int, place: str) -> int:
     """The vertex that an element names: from 1, or from -1 backwards; what follows a slash is its
-    texture and its normal."""
+    texture and its normal. Programs that hold all in one array of numbers write 3 as 3.0."""
     try:
-        number = int(text.split("/")[0])
+        number = int(_WHOLE_AS_FRACTION.sub("", text.split("/")[0]))
     except ValueError:
         raise InputError("expected numbers of vertices", field=place, value=text) from None
     if not 1 <= abs(number) <= n_vertices:

@@ -229,3 +229,20 @@ def _unknown_unit() -> bytes:
         lines(space)
 
     return dxf(draw)
+
+
+def _huge_array(contents: int) -> bytes:
+    """The net, and an array of 30,000 x 30,000 insertions of a block of so many lines."""
+
+    def draw(document: Any, space: Any) -> None:
+        block = document.blocks.new("SPECK")
+        lines(block, NET[:contents])
+        array = {"row_count": 30_000, "column_count": 30_000, "row_spacing": 1, "column_spacing": 1}
+        space.add_blockref("SPECK", (0, 0), dxfattribs=array)
+        lines(space)
+
+    return dxf(draw)
+
+
+case("array_of_too_many.dxf", Refused("draws more than 200,000 entities"))(lambda: _huge_array(1))
+case("array_of_nothing.dxf", Net())(lambda: _huge_array(0))

@@ -101,6 +101,17 @@ def _one() -> str:
     return obj(NET) + "l 1\n"
 
 
+@case("numbers_of_vertices_as_fractions.obj", Net())
+def _fractions() -> str:
+    """As scripts write them that hold all in one array of numbers."""
+    return obj(NET, numbers="{}.0 {}.000")
+
+
+@case("half_a_vertex.obj", Refused("line 3 = '1.5': expected numbers of vertices"))
+def _half() -> str:
+    return obj(NET, numbers="1.5 2")
+
+
 @case("vertex_zero.obj", Refused("line 3 = 0: no such vertex"))
 def _zero() -> str:
     return obj(NET, numbers="0 1")

@@ -310,6 +310,9 @@ case(
 case("edges_that_reach_nothing.json", Refused("can't be read as JSON of COMPAS", {"edges": True}))(
     lambda: json.dumps({"node": places(), "edge": {"0": {"99": {}}}})
 )
+case("edges_without_places.json", Refused("have its nodes no coordinates?", {"edges": True}))(
+    lambda: json.dumps({"node": {"0": {}, "1": {}}, "edge": {"0": {"1": {}}}})
+)
 
 
 # -- files of other formats under a wrong name ----------------------------------------------------

@@ -21,5 +21,11 @@ def _content(curves: Sequence[Mapping[str, Any]], options: Mapping[str, Any]) ->
 
 register_net(
     "c_shell",
-    NetClass("a C-shell", "C-shells", _content, options=("opening", "target"), needed=("opening",)),
+    NetClass(
+        "a C-shell",
+        "C-shells",
+        _content,
+        options=("opening", "target", "free_ends"),
+        needed=("opening",),
+    ),
 )
