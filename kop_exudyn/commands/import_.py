@@ -16,6 +16,7 @@ from .output import add_json
 from .values import angle, held_joints, number_list, number_pair, patch, positive_number
 
 if TYPE_CHECKING:
+    from ..errors import InputError
     from ..exchange.drawing import Finding
     from ..exchange.drawn_networks import DrawnNetwork, ReadingOptions
     from ..exchange.imports import Imported
@@ -165,7 +166,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "the points of polylines, or keep their corners (default: %(default)s)",
     )
     shell.add_argument(
-        "--free-ends", action="store_true", help="of a C-shell: keep the rods' ends beyond their last joint"
+        "--free-ends",
+        action="store_true",
+        help="of a C-shell: keep the rods' ends beyond their last joint",
     )
     shell.add_argument(
         "--layer",

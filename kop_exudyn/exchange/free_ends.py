@@ -46,8 +46,6 @@ def free_end_doubts(drawn: DrawnNetwork, units: Units | None, kept_by: str) -> l
     flat = np.column_stack([tips[long], np.zeros(long.sum())]) / drawn.options.scale
     longest = with_unit(float(lengths.max()), "length", units)
     how = f" ({kept_by} keeps ends)" if kept_by else ""
-    text = (
-        f"{counted(int(long.sum()), 'free end that is cut off is', 'free ends that are cut off are')} "
-        f"longer than half a span, up to {longest}: is no joint missing there?{how}"
-    )
+    ends = counted(int(long.sum()), "free end that is cut off is", "free ends that are cut off are")
+    text = f"{ends} longer than half a span, up to {longest}: is no joint missing there?{how}"
     return [Finding("suspicious", text, drawn.frame.back(flat))]
