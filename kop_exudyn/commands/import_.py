@@ -27,7 +27,7 @@ HELP = "turn a drawing, a surface or a released umbrella mesh into a design file
 DESCRIPTION = """Writes a design file from
 
   a drawing (.obj: its polylines and splines; .dxf: lines, polylines, arcs, circles, ellipses, splines, blocks; .3dm:
-  curves, blocks): a C-shell, its curves hinged wherever they cross; or, with --as grid, a grid of lamellas over its
+  curves, blocks; .json: curves of COMPAS, or lists of points): a C-shell, its curves hinged wherever they cross; or, with --as grid, a grid of lamellas over its
   curves on a surface, drawn in plan, or on the net's own surface where it is drawn in space. Drawings of C-shells lie
   in a plane. Pieces that go on in each other become one curve; ends that meet and are of the two different families
   are hinged.
@@ -75,7 +75,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "file",
         type=Path,
         metavar="FILE",
-        help="drawing (.obj, .dxf, .3dm), surface (.obj, .ply, .stl, "
+        help="drawing (.obj, .dxf, .3dm, .json), surface (.obj, .ply, .stl, "
         ".off, .json) or released umbrella mesh (.json, .json.gz)",
     )
     parser.add_argument("--out", type=Path, metavar="DESIGN", help="design file to write (.json)")
@@ -175,8 +175,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="of DXF and 3dm files, the layer to read, hidden or not; may be given several times "
-        "(default: all that can be seen)",
+        help="of DXF and 3dm files, the layer to read, hidden or not; of JSON files a key; may be "
+        "given several times (default: all that can be seen)",
     )
     shell.add_argument(
         "--join",
@@ -263,8 +263,9 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"can't be imported{how} (known: {', '.join(known)})", source=args.file)
     for path in filter(None, (args.out, args.preview)):
         check_output_file(path, overwrite=args.overwrite)
-    surface = args.kind is None and is_drawing(args.file) and is_surface(args.file)
-    drawn = args.edges or (is_drawing(args.file) and not surface)
+    drawing = is_drawing(args.file)
+    surface = args.kind is None and drawing and is_surface(args.file)
+    drawn = args.edges or (drawing and not surface)
     wanted = args.kind or ("c_shell" if drawn and args.patch is None else None)
     if wanted in (None, "umbrella"):
         if len(args.elastic_limit or ()) > len(MATERIALS):

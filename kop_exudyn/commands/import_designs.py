@@ -94,6 +94,7 @@ def _figures(
 def _content(args: argparse.Namespace) -> dict[str, Any]:
     """The content of the design file, of a surface or of a file of another program."""
     from ..errors import InputError
+    from ..exchange.mesh_edges import holds_edges
     from ..files.documents import is_own
     from ..files.json_files import is_json_file, json_stem, read_json
     from ..io.conversion import in_units
@@ -117,8 +118,11 @@ def _content(args: argparse.Namespace) -> dict[str, Any]:
         raise InputError("an umbrella mesh on a surface needs --patch", source=args.file)
     foreign = foreign_format(data)
     if foreign is None or foreign.rewrite is None:
+        edges = "; of a mesh or graph of COMPAS, --edges reads the edges as laths"
         raise InputError(
-            f"isn't a {' or a '.join(format_names())}; of a surface, give --patch", source=args.file
+            f"isn't a {' or a '.join(format_names())}, nor has curves; of a surface, give --patch"
+            f"{edges if holds_edges(data) else ''}",
+            source=args.file,
         )
     check_options(args, "release")
     own = foreign.rewrite(data, json_stem(args.file), str(args.file))

@@ -1,5 +1,5 @@
-"""Curves from drawings: the polylines and splines of an OBJ file; what DXF and Rhino files draw,
-see `dxf_curves` and `rhino_curves`."""
+"""Curves from drawings: the polylines and splines of an OBJ file; what DXF, Rhino and JSON files
+draw, see `dxf_curves`, `rhino_curves` and `json_curves`."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from ..units import LENGTHS
 from ..wording import counted
 from .drawing import SAG, Drawing, DrawnCurve
 from .dxf_curves import dxf_drawing
+from .json_curves import holds_curves, json_drawing
 from .other_formats import is_really
 from .rhino_curves import rhino_drawing
 
@@ -34,19 +35,23 @@ _UNIT_WORDS = {
     "inches": "in",
     "feet": "ft",
 }
-_WITH_LAYERS = (".dxf", ".3dm")
+_WITH_LAYERS = (".dxf", ".3dm", ".json")
 
 
 def is_drawing(path: Path) -> bool:
-    """Whether a file's name is that of a drawing that can be read."""
-    return path.suffix.lower() in CURVE_READERS
+    """Whether a file's name is that of a drawing that can be read; JSON files, which may be much
+    else, by their content. Raises InputError when that can't be read."""
+    suffix = path.suffix.lower()
+    if suffix == ".json":
+        return holds_curves(read_bytes(path, SIZE_LIMIT))
+    return suffix in CURVE_READERS
 
 
 def read_drawing(path: str | Path, layers: Sequence[str] = ()) -> Drawing:
-    """All curves of an OBJ, DXF or 3dm file, told apart by the name's ending.
+    """All curves of an OBJ, DXF, 3dm or JSON file, told apart by the name's ending.
 
     layers : of DXF and 3dm files, those to read, hidden ones included; default: all that can be
-        seen
+        seen. Of JSON files, keys of the outermost dictionary
 
     Raises InputError when the file can't be read, is too large, or has no curves.
     """
@@ -56,7 +61,7 @@ def read_drawing(path: str | Path, layers: Sequence[str] = ()) -> Drawing:
         raise InputError(f"is no file of curves (known: {', '.join(CURVE_READERS)})", source=path)
     if layers and suffix not in _WITH_LAYERS:
         raise InputError(
-            "only DXF and 3dm files have layers", source=path, field="layer", value=layers[0]
+            "only DXF, 3dm and JSON files have layers", source=path, field="layer", value=layers[0]
         )
     content = read_bytes(path, SIZE_LIMIT)
     other = is_really(content)
@@ -150,4 +155,5 @@ CURVE_READERS: dict[str, Callable[[bytes, Sequence[str]], Drawing]] = {
     ".obj": _obj_drawing,
     ".dxf": dxf_drawing,
     ".3dm": rhino_drawing,
+    ".json": json_drawing,
 }

@@ -65,6 +65,11 @@ def edges_of(path: Path) -> Drawing:
     return Drawing(kept, unit, None if unit is None else LENGTHS[unit], doubts=doubts)
 
 
+def holds_edges(data: Any) -> bool:
+    """Whether the content of a JSON file has a mesh or graph of COMPAS."""
+    return any(True for _ in _structures(data))
+
+
 def _of_obj(content: bytes) -> Edges:
     found = parse_obj(content)
     return found.vertices, _sides(face for face, _ in found.faces)

@@ -105,7 +105,7 @@ class TestObj:
         assert str(caught.value).startswith(str(path))
 
     def test_layers_are_of_files_that_have_some(self, obj):
-        with pytest.raises(InputError, match="only DXF and 3dm files have layers"):
+        with pytest.raises(InputError, match="only DXF, 3dm and JSON files have layers"):
             read_drawing(obj, ["0"])
 
 
