@@ -115,7 +115,8 @@ def _harmonised(
 
 
 def _text(checks: list[DesignCheck], parts: Mapping[str, int], units: Units | None) -> str:
-    lines = [f"{counted(len(checks), 'design')}, compared by a kit of {counted_parts(parts)}"]
+    how = "compared by" if len(checks) > 1 else "beside"
+    lines = [f"{counted(len(checks), 'design')}, {how} a kit of {counted_parts(parts)}"]
     for check in checks:
         lines.append(f"\n{check.name}")
         if check.failed is None:
@@ -126,11 +127,12 @@ def _text(checks: list[DesignCheck], parts: Mapping[str, int], units: Units | No
                 f"  opens; deviation max {check.max_percent:.2g} %{length}, mean "
                 f"{check.mean_percent:.2g} % of its size{strength}"
             )
-        lines.append(
-            f"  {check.elements_percent:.0f} % of the elements, {check.energy_percent:.0f} % of "
-            f"the projection energy; without it the others' is {check.others_gain_percent:.0f} % "
-            f"lower"
-        )
+        if len(checks) > 1:
+            lines.append(
+                f"  {check.elements_percent:.0f} % of the elements, {check.energy_percent:.0f} % "
+                f"of the projection energy; without it the others' is "
+                f"{check.others_gain_percent:.0f} % lower"
+            )
         for cost in check.expensive[:1]:
             lines.append(
                 f"  dearest: {cost.kind} element {cost.number} of {_sizes(cost, units)}, its part "

@@ -15,6 +15,15 @@ def test_one_design_and_its_sizes(repository, tmp_path, capsys):
     assert sorted(path.name for path in out.iterdir()) == ["01_sinh.json", "03_exp.json"]
 
 
+def test_a_design_alone_is_not_compared_with_others(repository, capsys):
+    """There are none that could be nearer to their parts without it."""
+    models = repository / "models" / "small"
+    assert status_of("check", models, "--designs", "1", "--parts", "linear=3,angular=2") == 0
+    text = capsys.readouterr().out
+    assert text.startswith("1 design, beside a kit of 2 angular and 3 linear parts")
+    assert "opens; deviation max" in text and "dearest: " in text and "others" not in text
+
+
 @pytest.mark.parametrize(
     "more, message",
     [
