@@ -49,7 +49,8 @@ def json_drawing(content: bytes, layers: Sequence[str]) -> Drawing:
     numbers = {len(points[0]) for points in _bare(found)}
     if len(numbers) > 1:
         raise InputError("has lists of points of two and of three numbers: are some no points?")
-    outlines, others = [], Counter[str]()
+    outlines: list[tuple[Outline, str]] = []
+    others: Counter[str] = Counter()
     for kind, data, layer in found:
         if layers and layer not in layers:
             continue

@@ -18,6 +18,7 @@ from .curves import Curve
 TOLERANCE = 1e-6
 # Curves that meet at a smaller angle (rad) touch: no hinge could open there.
 _LEAST_ANGLE = 0.02
+_TOLD_ANGLE = 0.01  # degrees: less is no angle that was drawn
 _NEWTON = 40
 _NEAR_SINGULAR = 1e-4
 _MOST_PIECES = 2_000_000  # of all coarse polylines: some hundred thousand points
@@ -187,9 +188,12 @@ def _crossings(
     if len(touching):
         k = touching[np.lexsort((s[touching], b[touching], a[touching]))[0]]
         x, other = curves[a[k]].position(s[k]), curves[b[k]].field
+        degrees = float(np.degrees(np.arcsin(np.abs(sine[k]))))
+        least = np.degrees(_LEAST_ANGLE)
+        angle = f" (at {degrees:.2g}°: joints need {least:.3g}°)" if degrees > _TOLD_ANGLE else ""
         raise InputError(
             f"touches {other} or runs along it near ({x[0]:.6g}, {x[1]:.6g}) instead of crossing "
-            "it",
+            f"it{angle}",
             field=curves[a[k]].field,
         )
     keep = np.flatnonzero(meeting & (gap <= 1e-3 * margin))

@@ -185,6 +185,11 @@ def test_three_families_leave_joints_of_one_family_out_of_the_opening():
             r"curves\[0\].points: touches curves\[1\]",
         ),
         (
+            [line((0, 0), (4, 0)), line((0, -0.0175), (4, 0.0175))],
+            {"free_ends": True},
+            r"near \(2, 0\) instead of crossing it \(at 0.5°: joints need 1.15°\)",
+        ),
+        (
             grid() + [line((-0.5, -0.5), (3, 1.5), (1, 2.6), (0.6, -0.7))],
             {},
             r"curves\[6\].points: the curve crosses itself",
