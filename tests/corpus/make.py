@@ -1,7 +1,7 @@
 """Writes the files of the corpus: python tests/corpus/make.py
 
 Each file is what a CAD program might write; what must come out of it stands beside the function
-that makes it, in drawings.py and meshes.py.
+that makes it, in the modules beside this one.
 """
 
 from __future__ import annotations
