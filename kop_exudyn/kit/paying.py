@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,11 +45,9 @@ class PayingElements:
         normal, right : (N, k_p, k_p), (N, k_p), which the normal equations of the elements that are
             served at a profit are added to
         """
-        kernels = library()
-        if kernels is None or self.V.shape[0] * self.V.shape[1] > _MOST:
-            step = max(1, _AT_ONCE // (len(self.values) * self.V.size))
-            for k in range(0, len(parts), step):
-                some = slice(k, k + step)
+        kernels = self._kernels()
+        if kernels is None:
+            for some in self._slices(len(parts)):
                 self._add_served(
                     parts[some],
                     prices,
@@ -82,11 +82,9 @@ class PayingElements:
         """Add what parts between low and high (N, k_p) earn at most: with elements taken one by one
         to alone (N,), with those taken together as alone + 2 slope.p - curvature.p^2 to all of
         alone, curvature and slope (N, k_p)."""
-        kernels = library()
-        if kernels is None or self.V.shape[0] * self.V.shape[1] > _MOST:
-            step = max(1, _AT_ONCE // (len(self.values) * self.V.size))
-            for k in range(0, len(low), step):
-                some = slice(k, k + step)
+        kernels = self._kernels()
+        if kernels is None:
+            for some in self._slices(len(low)):
                 self._add_in_boxes(
                     low[some], high[some], prices, exact, alone[some], curvature[some], slope[some]
                 )
@@ -105,6 +103,15 @@ class PayingElements:
             address(curvature),
             address(slope),
         )
+
+    def _kernels(self) -> ctypes.CDLL | None:
+        """Those that are compiled, where they have room for these elements."""
+        return library() if self.V.shape[0] * self.V.shape[1] <= _MOST else None
+
+    def _slices(self, count: int) -> Iterator[slice]:
+        """Of so many parts or boxes, those that NumPy works on at a time."""
+        step = max(1, _AT_ONCE // (len(self.values) * self.V.size))
+        return (slice(k, k + step) for k in range(0, count, step))
 
     def _addresses(self, prices: np.ndarray) -> list[int]:
         return [address(a) for a in (self.values, self.V, self.W, self.weights, prices)]
