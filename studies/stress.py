@@ -73,7 +73,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         fuzzed = fuzz(tqdm(range(100_000 // share), "damaged files", disable=None), Path(folder))
         memory = peak_memory_mb()
-        interrupted = interruptions(5 if study.quick else 1, effort)
+        interrupted = interruptions(6 if study.quick else 1, effort)
         killed = kill_processes(Path(folder), max(1, 50 // share), effort)
 
     both = random + symmetric

@@ -11,28 +11,22 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from scipy.spatial import cKDTree
 
 from ..drawing.colours import kit_colours
 from ..drawing.labels import Label, place
-from ..drawing.style import FAINT, INK, QUIET, save_figure, style
-from ..files.files import file_stem, make_folder
+from ..drawing.style import FAINT, INK, QUIET
 from ..kit.kinds import has_joint, part_kind
-from ..scene.state import State
-from .assembly import stands_on_edge
 from .cells import sorts_of_arms
 from .lamellas import UPPER, Lamellas
-from .options import millimetres
-from .paper import SCALES, Book, fitting_scale, scale_name
+from .paper import SCALES
 from .pieces import PartsList, Piece
 from .placement import PlacedPieces
 
@@ -41,9 +35,6 @@ _CELL_ROOM = 6.0  # mm between the middles of neighbouring cells, at least
 _BESIDE = 1.7  # mm from a rod's axis to the middle of the text beside it
 _GAP = 1.1  # mm on either side of a crossing in which the lower rod isn't drawn
 _ROD = 2.0  # points
-_OVERLAP = 12.0  # mm that neighbouring pages share
-_EDGE = 3.0  # mm at a page's edge in which labels may be missing
-_MARGIN = 12.0  # mm around the drawing on a sheet of its own
 _ALONG = (0.5, 0.36, 0.64, 0.24, 0.76)  # places of a label along its rod
 _AROUND = np.radians([45, 135, 225, 315, 0, 90, 180, 270])
 
@@ -285,207 +276,3 @@ def _add(ax: Axes, lines: Sequence[np.ndarray], colours: Any, width: float, clip
     ax.add_collection(collection, autolim=False)
     if clip is not None:
         collection.set_clip_path(Rectangle(clip[:2], *clip[2:], transform=ax.transData))
-
-
-def assembly_drawing(parts: PartsList, name: str, unit: str) -> AssemblyDrawing:
-    """The drawing of one design, as it is assembled.
-
-    Lamellas are drawn in the state in which they are put together: the flat one, where the design
-    has one, else the deployed one. Parts of other kinds are drawn where the design's geometry has
-    them before anything is opened. Seen across its mean plane, from the side to which joint axes
-    point; the longest extent lies across the paper.
-
-    unit : the designs' unit of length
-    Raises InputError for a design that isn't there.
-    """
-    scale, number = millimetres(unit), parts.row_of(name)
-    pieces = parts.designs[number]
-    design = pieces.design
-    role = next((role.name for role in design.roles if not role.fitted), design.fitted_role.name)
-    placed = PlacedPieces.of(pieces, role)
-    flat = any(has_joint(part_kind(piece.kind)) for piece in pieces.pieces)
-    state = parts.states[number][role] if parts.states and flat else placed.scene.initial
-    if design.hardware is not None:  # a scene begins with what holds it where that is in the end
-        positions = state.positions.copy()
-        positions[design.joints] = design.hardware.joints
-        state = State(positions, state.rotations, state.angles)
-    return flattened(parts, placed, state, scale)
-
-
-def flattened(
-    parts: PartsList, placed: PlacedPieces, state: State, scale: float = 1.0
-) -> AssemblyDrawing:
-    """A state projected along the direction in which the joints extend least, as narrow as it can
-    be.
-
-    scale : millimetres of the design's unit of length
-    """
-    scene = placed.scene
-    x, joints = scene.node_poses(state)[0], state.positions[placed.design.joints]
-    centre = joints.mean(axis=0)
-    right, _, normal = np.linalg.svd(joints - centre)[2]
-    if normal @ state.rotations[placed.design.joints][:, :, 2].mean(axis=0) < 0:
-        normal = -normal
-    plane = np.stack([right, np.cross(normal, right)], axis=1)
-    axes = scale * plane @ _turn_across((joints - centre) @ plane)
-    flat = (x - centre) @ axes
-    return AssemblyDrawing(
-        parts,
-        placed,
-        [flat[chain.nodes] for chain in scene.chains],
-        (joints - centre) @ axes,
-        {p: (state.positions[c.body] - centre) @ axes for p, c in placed.corners.items()},
-        _plates(placed, centre, axes),
-    )
-
-
-def _turn_across(points: np.ndarray) -> np.ndarray:
-    """(2, 2) turn after which points (n, 2) @ it take the smallest rectangle, its long side lying
-    across."""
-    around = shapely.minimum_rotated_rectangle(shapely.MultiPoint(points))
-    if around.geom_type != "Polygon":
-        return np.eye(2)
-    corners = np.array(around.exterior.coords)
-    sides = np.diff(corners[:3], axis=0)
-    x, y = sides[np.argmax(np.linalg.norm(sides, axis=1))]
-    length = np.hypot(x, y) * (1 if x >= 0 else -1)
-    return np.array([[x, -y], [y, x]]) / length
-
-
-def _plates(placed: PlacedPieces, centre: np.ndarray, axes: np.ndarray) -> np.ndarray:
-    """(n_cells, 3, 2) plates of a design of cells; none of others."""
-    hardware = placed.design.hardware
-    if hardware is None:
-        return np.zeros((0, 3, 2))
-    corners = np.dstack([hardware.corners, np.full(hardware.corners.shape[:2], centre[2])])
-    return (corners - centre) @ axes
-
-
-def assembly_pages(book: Book, drawing: AssemblyDrawing) -> None:
-    """The drawing on pages: all of it first, then, where that is more than one page, its parts."""
-    page = book.page(f"Assembly of {drawing.name}")
-    low, room = page.low + [0.0, 6.0], page.room - [0.0, 6.0]
-    size = np.ptp(drawing.box, axis=0)
-    # as large as one page allows, and larger where labels need it
-    page.scale = scale = min(drawing.scale, fitting_scale(size, room - 14.0, SCALES[0]))
-    if (size / scale <= room - 14.0).all():
-        origin = low + room / 2 - drawing.box.mean(axis=0) / scale
-        drawing.draw(page.ax, scale, origin, np.array([low, low + room]))
-        page.text(page.low[0], page.low[1], explanation(drawing.placed), 7, color=QUIET)
-        return
-    inner = room - _OVERLAP
-    counts, scale = _tiles(size, inner, scale)
-    page.scale = fitting_scale(size, room - 4.0)
-    origin = low + room / 2 - drawing.box.mean(axis=0) / page.scale
-    drawing.draw(page.ax, page.scale, origin, None)
-    page.text(page.low[0], page.low[1], explanation(drawing.placed), 7, color=QUIET)
-    corner = drawing.box.mean(axis=0) / scale - (counts * inner + _OVERLAP) / 2
-    drawn = shapely.union_all(
-        [shapely.LineString(line / scale) for line in drawing.lines]
-        + [shapely.Polygon(cell / scale) for cell in drawing.cells]
-    )
-    places = [
-        np.array([column, row]) for row in reversed(range(counts[1])) for column in range(counts[0])
-    ]
-    tiles = [corner + at * inner for at in places]  # lower left, on paper at the drawing's scale
-    kept = _needed(drawn, [shapely.box(*at, *(at + room)) for at in tiles])
-    names = {tuple(places[k].tolist()): number for number, k in enumerate(kept, 1)}
-    page.heading += f": where its {len(kept)} pages are"
-    for number, tile in enumerate((tiles[k] for k in kept), 1):
-        lower, upper = (origin + at * scale / page.scale for at in (tile, tile + room))
-        ring = np.array([lower, [upper[0], lower[1]], upper, [lower[0], upper[1]], lower])
-        page.line(ring, QUIET, 0.15)
-        x, y = (lower + upper) / 2
-        page.text(x, y, str(number), 16, color=QUIET, ha="center", va="center", alpha=0.6)
-        one = book.page(f"Assembly of {drawing.name}, part {number} of {len(kept)}", scale)
-        drawing.draw(one.ax, scale, low - tile, np.array([low, low + room]))
-        beside = _neighbours(places[kept[number - 1]], names)
-        note = f"{_OVERLAP:g} mm are shared with the next parts: {beside}"
-        one.text(one.low[0], one.low[1], note, 7, color=QUIET)
-
-
-def _needed(drawn: Any, windows: Sequence[Any]) -> list[int]:
-    """Numbers of the windows that show something of a drawing that no other one shows."""
-    kept = [k for k, window in enumerate(windows) if drawn.intersects(window)]
-    for k in list(kept):
-        others = [windows[other].buffer(-_EDGE) for other in kept if other != k]
-        if drawn.intersection(windows[k]).difference(shapely.union_all(others)).is_empty:
-            kept.remove(k)
-    return kept
-
-
-def _tiles(size: np.ndarray, inner: np.ndarray, scale: float) -> tuple[np.ndarray, float]:
-    """How many pages across and down a drawing takes, and its scale there: the largest drawing on
-    as many pages as the scale that is asked for needs.
-
-    size : of the thing, mm; inner : what a page adds to the one before, mm
-    """
-
-    def pages(at: float) -> np.ndarray:
-        return np.maximum(np.ceil((size / at + 14.0 - _OVERLAP) / inner), 1).astype(int)
-
-    wanted = pages(scale)
-    larger = [s for s in SCALES if s <= scale and (pages(s) == wanted).all()]
-    return wanted, min(larger)
-
-
-def save_assembly_drawing(
-    drawing: AssemblyDrawing, folder: str | Path, *, overwrite: bool = False
-) -> list[Path]:
-    """Write assembly_DESIGN.svg, all of it on one sheet; returns its path.
-
-    Raises InputError when a file can't be written.
-    """
-    stem = make_folder(folder) / f"assembly_{file_stem(drawing.name)}"
-    return save_figure(draw_assembly(drawing), stem, ("svg",), overwrite=overwrite)
-
-
-def draw_assembly(drawing: AssemblyDrawing) -> Figure:
-    """The whole drawing on one sheet of its own size."""
-    scale = drawing.scale
-    width, height = np.ptp(drawing.box, axis=0) / scale + 2 * _MARGIN
-    width, height = max(width, 130.0), height + 12.0
-    with style():
-        figure = Figure(figsize=(width / 25.4, height / 25.4))
-        ax = figure.add_axes((0, 0, 1, 1))
-        ax.set(xlim=(0, width), ylim=(0, height))
-        ax.set_axis_off()
-        origin = np.array([width / 2, height / 2]) - drawing.box.mean(axis=0) / scale
-        drawing.draw(ax, scale, origin, np.array([[0.0, 0.0], [width, height]]))
-        title = f"{drawing.name}, scale {scale_name(scale)}"
-        ax.text(_MARGIN, height - 6.0, title, size=11, weight="bold", va="center", parse_math=False)
-        ax.text(_MARGIN, 5.0, explanation(drawing.placed), size=6.5, color=QUIET, va="center")
-    return figure
-
-
-def explanation(placed: PlacedPieces) -> str:
-    """What the labels mean."""
-    kinds = {piece.kind for piece in placed.pieces.pieces}
-    if any(has_joint(part_kind(kind)) for kind in kinds):
-        text = (
-            "bold: part, along its side 1 (·2: only its side 2 is used) · grey: element, joint · "
-            "(n): lamella · drawn through: the upper lamella"
-        )
-    else:
-        text = (
-            "part (m: mirrored, top and bottom change places; ·a, ·b: the sort of its arms), below "
-            "it the element · grey: joint · seen from above"
-        )
-    if not any(part_kind(kind).angular for kind in kinds):
-        return text
-    if not stands_on_edge(placed):
-        return f"{text} · diamonds: corners (·f: flipped, turned over)"
-    return (
-        f"{text}\ndiamonds: corners, bent so that the lamella rises towards you at its ends (·f: "
-        "flipped, it falls away)"
-    )
-
-
-def _neighbours(place: np.ndarray, names: Mapping[tuple[int, ...], int]) -> str:
-    """Which parts lie to the left, right, above and below a place.
-
-    names : number of the part at each place that has one, columns and rows counted from below
-    """
-    sides = {"left": (-1, 0), "right": (1, 0), "above": (0, 1), "below": (0, -1)}
-    near = {side: names.get(tuple((place + step).tolist())) for side, step in sides.items()}
-    return ", ".join(f"{side} {number}" for side, number in near.items() if number is not None)

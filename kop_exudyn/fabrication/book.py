@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from ..kit.kinds import part_kind
 from .assembly import joint_places, joint_table
-from .assembly_drawing import AssemblyDrawing, assembly_pages
+from .assembly_drawing import AssemblyDrawing
 from .assembly_order import assembly_steps, fasteners
+from .assembly_pages import assembly_pages
 from .blanks import Blanks
 from .cutlist import cut_list, purchases, totals
 from .cutsheets import Sheet

@@ -10,8 +10,9 @@ from ..errors import InputError
 from ..files.files import file_stem, make_folder, write_text
 from ..files.tables import write_csv
 from .assembly import joint_places, joint_table, write_assembly_plan
-from .assembly_drawing import assembly_drawing, save_assembly_drawing
+from .assembly_layout import assembly_drawing
 from .assembly_order import assembly_steps, fasteners
+from .assembly_pages import save_assembly_drawing
 from .blanks import Blanks
 from .book import workshop_book
 from .cutlist import purchases, totals, write_bill, write_cut_list

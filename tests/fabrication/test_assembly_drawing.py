@@ -10,9 +10,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from kop_exudyn.drawing.labels import Label, place
 from kop_exudyn.errors import InputError
-from kop_exudyn.fabrication.assembly_drawing import (
+from kop_exudyn.fabrication.assembly_layout import assembly_drawing
+from kop_exudyn.fabrication.assembly_pages import (
     _tiles,
-    assembly_drawing,
     assembly_pages,
     draw_assembly,
     explanation,

@@ -9,8 +9,9 @@ import shapely
 import kop_exudyn as kop
 from kop_exudyn.errors import InputError
 from kop_exudyn.fabrication.assembly import assembly_plan
-from kop_exudyn.fabrication.assembly_drawing import assembly_drawing, explanation
+from kop_exudyn.fabrication.assembly_layout import assembly_drawing
 from kop_exudyn.fabrication.assembly_order import assembly_steps, fasteners
+from kop_exudyn.fabrication.assembly_pages import explanation
 from kop_exudyn.fabrication.blanks import Blanks
 from kop_exudyn.fabrication.cutlist import cut_list, totals
 from kop_exudyn.fabrication.cutsheets import cut_sheets

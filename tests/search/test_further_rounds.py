@@ -5,6 +5,7 @@ from itertools import count
 
 import numpy as np
 import pytest
+from support.settings import FEW_ERRORS
 from support.shells import stages_of_two
 
 from kop_exudyn.errors import SimulationFailure
@@ -18,7 +19,7 @@ from kop_exudyn.search.reassign import keep_parts
 from kop_exudyn.search.settings import StageSettings
 from kop_exudyn.search.stages import Stages
 
-SETTINGS = StageSettings(assigned_steps=3, round_steps=6)
+SETTINGS = StageSettings(assigned_steps=3, round_steps=6, requirements=FEW_ERRORS)
 
 
 @pytest.fixture(scope="module")

@@ -20,8 +20,18 @@ from kop_exudyn.files.json_files import write_json
 
 from .arch import arch_data
 
-# `kop` itself, with the class of the stress tests known to it
-_PROGRAM = "import sys, lib.stress.arch; from kop_exudyn.cli import main; sys.exit(main())"
+# `kop` itself, with the class of the stress tests known to it, and small pictures in its report:
+# drawing large ones takes longer than finding these kits
+_PROGRAM = """
+import sys
+from functools import partial
+import lib.stress.arch
+from kop_exudyn.cli import main
+from kop_exudyn.report import kit_report
+kit_report.kit_pictures = partial(kit_report.kit_pictures, width=160, height=115)
+sys.exit(main())
+"""
+_SAMPLES = 2  # of a verdict, which comes after all that is kept
 _STUDIES = Path(__file__).resolve().parents[2]
 # all in a result that may differ between two runs of one job
 _TIMES = {"wall_s", "peak_memory_mb", "seconds"}
@@ -52,6 +62,8 @@ def start(designs: Path, out: Path, effort: str = "normal") -> subprocess.Popen:
             "1",
             "--effort",
             effort,
+            "--samples",
+            str(_SAMPLES),
             "--resume",
             "-q",
         ],
