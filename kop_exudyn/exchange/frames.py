@@ -11,6 +11,7 @@ from .drawing import DrawnCurve
 
 _FLAT = 1e-4  # of the size: how far a drawing may leave its plane
 _PLANES = ((0, 1), (0, 2), (1, 2))
+_TOWARDS_US = (1.0, -1.0, 1.0)  # in the right, front and top views of CAD programs
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,8 @@ class Frame:
 
 def frame_of(curves: Sequence[DrawnCurve], size: float) -> Frame:
     """The coordinate plane that a drawing lies in (the first of xy, xz, yz), else the plane that it
-    is nearest to: of tilted drawings with its own origin, in their middle.
+    is nearest to: of tilted drawings with its own origin, in their middle. Axes are right-handed:
+    a net in the xz plane, as the front views of CAD programs have it, is seen from -y.
 
     size : diagonal of the drawing's box
     """
@@ -61,10 +63,12 @@ def frame_of(curves: Sequence[DrawnCurve], size: float) -> Frame:
         up = 3 - x - y
         if extent[up] <= _FLAT * size:
             axes = np.eye(3)[[x, y, up]]
+            axes[2] = np.cross(axes[0], axes[1]) + 0.0  # no negative zeros in files
             return Frame(np.zeros(3), axes, float(extent[up] / size))
     middle = points.mean(axis=0)
     normal = np.linalg.svd(points - middle, full_matrices=False)[2][2]
-    normal = normal * np.sign(normal[np.argmax(np.abs(normal))])
+    largest = np.argmax(np.abs(normal))
+    normal = normal * np.sign(normal[largest] * _TOWARDS_US[largest])
     heights = (points - middle) @ normal
     if np.ptp(heights) > _FLAT * size:  # a net in space: seen along the axis it lies across most
         up = int(np.argmax(np.abs(normal)))
