@@ -29,7 +29,7 @@ from kop_exudyn.search.weights import Weights
 from kop_exudyn.structures.base import Design
 
 from .study import Study
-from .study_tasks import QUICK, SIZES, changed, stages_of
+from .study_tasks import QUICK, changed, stages_of
 from .sweep import Task
 
 # many kits, each of which goes on from a neighbour: fewer rounds than one from scratch
@@ -84,7 +84,9 @@ def sized_cases(models: Path, quick: bool = False) -> list[SizedCase]:
     shells = select_files(models / "conformals", 5)
     grids, umbrellas = (select_files(models / name) for name in ("grids", "umbrellas"))
     return [
-        SizedCase("five C-shells", shells, "linear", SIZES, {"angular": 5}, (2, 6, 12, 25)),
+        SizedCase(
+            "five C-shells", shells, "linear", (2, 3, 4, 6, 8, 12, 25), {"angular": 5}, (2, 6, 12)
+        ),
         SizedCase("umbrella meshes", umbrellas, "cell", few, {}, (1, 4, 12)),
         SizedCase("grids", grids, "linear", few, {"angular": 5}, (1, 4, 12)),
     ]
