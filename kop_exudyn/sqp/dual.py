@@ -27,7 +27,7 @@ from .qp import QP, QPResult, QPSolver
 from .qp_backends import factorise_positive
 
 _ROUNDS = 40
-_MET = 1e-9  # of the largest entry of a row's terms: what rounding leaves of a limit
+_MET = 1e-9  # of a row's terms, or the largest unknown: what rounding leaves of a limit
 _MOST = 0.5  # of the unknowns: with more limits the whole problem is as quick
 
 
@@ -191,11 +191,21 @@ class _Search:
     def _exceeded(self) -> list[np.ndarray]:
         """By kind of limit, the places of those that x exceeds and that aren't taken in."""
         qp, x = self.qp, self.x
-        row = qp.A @ x
-        above = [row - qp.hi, qp.lo - row, x - qp.ub, qp.lb - x]
-        over = [np.zeros(0) if self.elastic is None else self._elastic_rows(), *above]
-        size = _MET * max(1.0, float(np.abs(x).max(initial=0.0)))
-        return [np.flatnonzero((value > size) & ~taken) for value, taken in zip(over, self._in)]
+        row, size = qp.A @ x, np.abs(x)
+        over = [row - qp.hi, qp.lo - row, x - qp.ub, qp.lb - x]
+        terms = abs(qp.A) @ size
+        largest = np.full(x.size, size.max(initial=0.0))
+        sizes = [terms, terms, largest, largest]
+        if self.elastic is not None:
+            over.insert(0, self._elastic_rows())
+            sizes.insert(0, abs(self.elastic.jacobian) @ self._inner(size))
+        else:
+            over.insert(0, np.zeros(0))
+            sizes.insert(0, np.zeros(0))
+        return [
+            np.flatnonzero((value > _MET * size) & ~taken)
+            for value, size, taken in zip(over, sizes, self._in)
+        ]
 
     def _elastic_rows(self) -> np.ndarray:
         assert self.elastic is not None

@@ -115,3 +115,18 @@ def test_steps_are_those_of_the_whole_subproblem(monkeypatch, width):
     assert np.allclose(by_dual.pressure, whole.pressure, atol=1e-4)
     assert by_dual.predicted == pytest.approx(whole.predicted, rel=1e-6)
     assert built.excess(by_dual.u).max() > 0  # some of the bounds had to give way
+
+
+@pytest.mark.parametrize("size", [1e-8, 1e8])
+def test_its_accuracy_is_that_of_the_unknowns(size):
+    """Near the end of a search steps are tiny: what a limit is exceeded by is seen against them."""
+    found = []
+    for by in (1.0, size):
+        qp, bounds = problem(5, 0.4, rows=2)
+        scaled = Inequalities(by * bounds.value, bounds.jacobian, bounds.bound)
+        qp = QP(qp.H, by * qp.g, qp.A, by * qp.lo, by * qp.hi, by * qp.lb, by * qp.ub)
+        # out of reach, so that the solution grows with the problem
+        found.append(solve_by_dual(qp, scaled, 1e6 * max(by, 1.0), QPSolver()))
+    assert all(one is not None and np.count_nonzero(one[0].z) > 2 for one in found)
+    (first, _), (other, _) = found
+    np.testing.assert_allclose(other.x / size, first.x, atol=1e-6)
