@@ -234,9 +234,11 @@ def _in_all(rows: list[dict[str, Any]]) -> list[str]:
         f"and the median of their largest deviation, as they open, is {medians[1]} of the target "
         f"instead of {medians[0]}"
     )
-    snapped = [sum(row["snapped"] or 0 for row in own) for own in (without, with_all)]
-    tried = sum(row["samples"] or 0 for row in with_all)
-    snaps = f"; {snapped[1]} of {tried} samples snap instead of {snapped[0]}" if tried else ""
+    shares = []  # where one of a few samples snaps, more are tried
+    for own in (without, with_all):
+        tried = sum(row["samples"] or 0 for row in own)
+        shares.append(f"{sum(row['snapped'] or 0 for row in own)} of {tried}" if tried else "none")
+    snaps = f"; {shares[1]} samples snap instead of {shares[0]}" if shares[1] != "none" else ""
     return [f"{text}{snaps}."]
 
 

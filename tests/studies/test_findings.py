@@ -31,7 +31,7 @@ def test_requirements_are_told_by_what_all_of_them_cost():
     assert first_sentence(told) == (
         "Where all is required, 2 of 2 designs open into the state shown instead of 1, and the "
         "median of their largest deviation, as they open, is 0.6 % of the target instead of 2 %; "
-        "0 of 40 samples snap instead of 6."
+        "0 of 40 samples snap instead of 6 of 40."
     )
     assert "Required nothing: 1 of 2 designs" in told and "Required opening: 1 of 1" in told
     dearer = [_row("nothing", True, None, 0), _row("+ load", False, 3.0, 9)]
