@@ -44,6 +44,10 @@ _MARKERS = {
 }
 
 
+# stages that kits are compared with, as sentences name them
+BASELINES = {"direct": "direct", "unrelaxed": "unrelaxed", "published_opened": "published method"}
+
+
 def told(stage: str) -> str:
     """The name of a stage as a reader knows it."""
     return stage.replace("_", " and ")
@@ -71,6 +75,11 @@ def comparison_rows(class_name: str, result: KitResult) -> list[dict[str, Any]]:
         row |= _verdict(result, n)
         row |= {
             f"{told(stage)} energy": summary.get("energy_ratio") for stage, summary in found.items()
+        }
+        row |= {
+            f"{told(stage)} utilisation": _utilisation(found[stage])
+            for stage in BASELINES
+            if stage in found
         }
         row["buckled"] = (
             ", ".join(
@@ -102,10 +111,23 @@ def _verdict(result: KitResult, number: int) -> dict[str, Any]:
     }
 
 
+def _utilisation(summary: Mapping[str, Any]) -> float | None:
+    """The largest of a stage's states, of the elastic limit; None where none is known."""
+    states = (summary.get("strength") or {}).values()
+    known = [state["utilisation"] for state in states if state.get("utilisation") is not None]
+    return max(known, default=None)
+
+
+def _beyond(row: Row, stage: str) -> str:
+    """That a stage is stressed beyond the elastic limit, which the kit found here keeps."""
+    used = row.get(f"{told(stage)} utilisation")
+    return f", stressed to {100 * used:.0f} % of its limit" if used and used > 1 else ""
+
+
 def finding(rows: Sequence[Row]) -> str:
     """What the rows say, in a few sentences: first what the method gains, then where it is worse
     than a baseline, then what can't be built."""
-    names = {"direct": "direct", "unrelaxed": "unrelaxed", "published_opened": "published method"}
+    names = BASELINES
     values = {stage: _values(rows, f"{told(stage)} max %") for stage in (*names, "assigned")}
     medians = ", ".join(
         f"{np.median(values[stage]):.2g} % ({name})"
@@ -122,9 +144,11 @@ def finding(rows: Sequence[Row]) -> str:
             f"before: {medians}. The worst design ends at {max(values['assigned']):.2g} %."
         )
     worse = [
-        f"{row['design']} ({name}: {row[key]:.2g} %, here {row['assigned max %']:.2g} %)"
+        f"{row['design']} ({name}: {row[key]:.2g} %{_beyond(row, stage)}, here "
+        f"{row['assigned max %']:.2g} %)"
         for row in rows
-        for key, name in ((f"{told(stage)} max %", name) for stage, name in names.items())
+        for stage, name in names.items()
+        for key in (f"{told(stage)} max %",)
         if row.get(key) is not None
         and row["assigned max %"] is not None
         and row[key] < row["assigned max %"]

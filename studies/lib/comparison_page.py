@@ -41,7 +41,10 @@ def begin(study: Study, rows: Sequence[Row], finding: str) -> StudyReport:
     )
     report.table(
         "designs",
-        [{key: row[key] for key in row if not key.endswith("energy")} for row in rows],
+        [
+            {key: row[key] for key in row if not key.endswith(("energy", " utilisation"))}
+            for row in rows
+        ],
         _DEVIATIONS,
     )
     return report

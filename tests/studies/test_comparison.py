@@ -27,3 +27,12 @@ def test_the_first_sentence_says_how_many_can_be_built():
 def test_where_all_can_be_built_that_is_said_last():
     told = finding([row("a", 0.5, True)])
     assert "which can be built" not in told and told.endswith("can be built.")
+
+
+def test_a_nearer_baseline_that_would_yield_is_told_so():
+    worse = row("c", 3.0, True) | {"direct utilisation": 2.4}
+    assert "Worse than a baseline: c (direct: 2 %, stressed to 240 % of its limit, here 3 %)." in (
+        finding([worse])
+    )
+    fine = row("c", 3.0, True) | {"direct utilisation": 0.4}
+    assert "c (direct: 2 %, here 3 %)" in finding([fine])
