@@ -51,10 +51,11 @@ def write(
 
     # 2. The designs, set by set.
     for name, result in results.items():
-        joints = [len(design.joints) for design in result.designs]
+        joints = sorted({len(design.joints) for design in result.designs})
+        sizes = " to ".join(map(str, dict.fromkeys((joints[0], joints[-1]))))
         report.section(
             name,
-            f"{realised(result)} of {min(joints)} to {max(joints)} joints; the search took "
+            f"{realised(result)} of {sizes} joints; the search took "
             f"{result.wall_s / 60:.0f} min. {' '.join(result.verdict)}",
         )
         alt = f"The {name} after direct projection and with the kit found here"
