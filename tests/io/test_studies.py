@@ -175,7 +175,7 @@ DESIGNS = 'designs = ["designs"]\n'
         ),
         (
             DESIGNS + "[weights]\nstrength = 1",
-            r"weights = 'strength': unknown term .*known: fit, energy, compliance, deflection, stress",
+            r"weights = 'strength': unknown term .*known: fit, energy, compliance",
         ),
         (
             DESIGNS + "[weights]\nstress = -1",
