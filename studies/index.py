@@ -18,7 +18,7 @@ STORY = (
     Chapter("pavilion", "Large structures from few different parts"),
     Chapter("two_stage", "One kit builds several designs"),
     Chapter("direct_vs_relaxed", "Searching beats rounding to the nearest part"),
-    Chapter("data_sets", "Ten C-shells, and nine grids, from thirteen parts each"),
+    Chapter("data_sets", "Ten designs from thirteen parts, and meshes of 150 cells"),
     Chapter("buildable", "What it costs that a kit can be built"),
     Chapter("kit_size_tradeoff", "How many parts are enough"),
     Chapter("part_reuse", "The same parts serve many designs"),

@@ -181,9 +181,10 @@ def drawn(one: Found) -> Figure:
             if known:
                 panel.plot(*zip(*known), mark, color=PALETTE[colour], label=told, markersize=7)
         plain_log(panel)
-        if len(panel.get_legend_handles_labels()[0]) > 3:
-            own = [*zip(*panel.get_legend_handles_labels())][3:]
-            panel.legend(*zip(*own), loc="upper right")
+        for legend in figure.legends:  # one for all, outside of the panels
+            legend.remove()
+        labels = panel.get_legend_handles_labels()
+        figure.legend(*labels, loc="outside lower center", ncols=3)
     return figure
 
 
