@@ -5,32 +5,23 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from .import_designs import MATERIALS, undrawn
+from .import_nets import drawn_net
 from .import_options import check_options
-from .import_output import by_option, tell
 from .output import add_json
 from .values import angle, held_joints, number_list, number_pair, patch, positive_number
-
-if TYPE_CHECKING:
-    from ..errors import InputError
-    from ..exchange.drawing import Finding
-    from ..exchange.drawn_networks import DrawnNetwork, ReadingOptions
-    from ..exchange.imports import Imported
-    from ..structures.nets import NetClass
-    from ..units import Units
 
 HELP = "turn a drawing, a surface or a released umbrella mesh into a design file"
 DESCRIPTION = """Writes a design file from
 
   a drawing (.obj: its polylines and splines; .dxf: lines, polylines, arcs, circles, ellipses, splines, blocks; .3dm:
-  curves, blocks; .json: curves of COMPAS, or lists of points): a C-shell, its curves hinged wherever they cross; or, with --as grid, a grid of lamellas over its
-  curves on a surface, drawn in plan, or on the net's own surface where it is drawn in space. Drawings of C-shells lie
-  in a plane. Pieces that go on in each other become one curve; ends that meet and are of the two different families
-  are hinged.
+  curves, blocks; .json: curves of COMPAS, or lists of points): a C-shell, its curves hinged wherever they cross; or,
+  with --as grid, a grid of lamellas over its curves on a surface, drawn in plan, or on the net's own surface where it
+  is drawn in space. Drawings of C-shells lie in a plane. Pieces that go on in each other become one curve; ends that
+  meet and are of the two different families are hinged.
 
   a surface (with --patch; a mesh: .obj, .ply, .stl, .off, or .json of COMPAS): an umbrella mesh in the shape of its
   middle, in millimetres, the arms as long as the cells have to grow.
@@ -60,14 +51,6 @@ class _Classes(Iterable[str]):
         from ..structures.base import class_names
 
         return iter(class_names())
-
-
-# What an option that a design needs is, with an example.
-_NEEDED = {
-    "opening": ": the angle that it opens by, as 35deg",
-    "section": " WIDTH,HEIGHT of its rods, in the design's unit",
-    "material": " YOUNG,POISSON of its rods, in the design's units",
-}
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -291,166 +274,4 @@ def run(args: argparse.Namespace) -> int:
             value=wanted,
         )
     check_options(args, wanted)
-    return _drawing(args, wanted, net)
-
-
-def _drawing(args: argparse.Namespace, wanted: str, net: NetClass) -> int:
-    """A design of a drawn net; its preview also where no design comes of it."""
-    from ..errors import InputError
-    from ..exchange.free_ends import free_end_doubts
-    from ..exchange.imports import read_scaled
-    from ..exchange.space_nets import with_heights_checked
-    from ..units import Units
-
-    if args.out is not None:
-        _require(args, net, *net.needed, "section", "material")
-    units = None if args.unit is None else Units(args.unit, args.force_unit)
-    drawn, units = read_scaled(args.file, _reading(args), args.scale, units, space=True)
-    if units is not None:
-        units = Units(units.length, args.force_unit)
-    try:
-        made = None if args.out is None else _made(args, wanted, drawn, units)
-        drawn.network  # which says what is wrong with it
-        if made is None and not drawn.frame.flat and args.surface is None:
-            drawn = with_heights_checked(drawn)
-    except InputError as error:
-        error = _keeping_ends(by_option(error.at(args.file)), _ends_kept_by(net))
-        if args.preview is not None:
-            _save_preview(args, net, drawn, drawn.findings, units, refused=str(error))
-        raise error from None
-    findings = drawn.findings if made is None else made.findings
-    if made is not None:
-        drawn = made.drawn
-        _write(args, made)
-    findings = [*findings, *free_end_doubts(drawn, units, _ends_kept_by(net))]
-    if args.preview is not None:
-        _save_preview(args, net, drawn, findings, units)
-    _tell(args, wanted, net, drawn, findings, units)
-    return 0
-
-
-def _made(
-    args: argparse.Namespace, wanted: str, drawn: DrawnNetwork, units: Units | None
-) -> Imported:
-    from ..exchange.design_data import Rods
-    from ..exchange.imports import import_net
-
-    rods = Rods(_section(args), _material(args), units)
-    name = args.file.stem
-    own = args.out.with_name(f"{args.out.stem}_surface.obj")
-    return import_net(drawn, wanted, name, rods, args.out, {**vars(args), "mesh_file": own})
-
-
-def _reading(args: argparse.Namespace) -> ReadingOptions:
-    from ..exchange.cleaning import TOLERANCE
-    from ..exchange.drawn_networks import ReadingOptions
-
-    return ReadingOptions(
-        layers=args.layer,
-        kind=args.curves,
-        free_ends=args.free_ends,
-        join=args.join,
-        tolerance=TOLERANCE if args.tolerance is None else args.tolerance,
-        largest_part=args.largest_part,
-        edges=args.edges,
-    )
-
-
-def _write(args: argparse.Namespace, made: Imported) -> None:
-    from ..exchange.polygons import write_mesh_obj
-    from ..files.files import check_output_file
-    from ..files.json_files import write_json
-
-    for path in made.meshes:
-        check_output_file(path, overwrite=args.overwrite)
-    unit = made.data.get("units", {}).get("length")
-    for path, (vertices, faces) in made.meshes.items():
-        write_mesh_obj(path, vertices, faces, unit=unit, overwrite=args.overwrite)
-    write_json(args.out, made.data, overwrite=args.overwrite)
-
-
-def _ends_kept_by(net: NetClass) -> str:
-    """The option that keeps free ends; "" where designs of the class have none."""
-    return "--free-ends" if "free_ends" in net.options else ""
-
-
-def _keeping_ends(error: InputError, kept_by: str) -> InputError:
-    """The error, with the option by which there would be none."""
-    from ..errors import InputError
-    from ..geometry.network import NOTHING_LEFT
-
-    if not kept_by or NOTHING_LEFT not in error.message:
-        return error
-    message = error.message.replace(NOTHING_LEFT, f"{NOTHING_LEFT} ({kept_by} keeps them)")
-    return InputError(message, source=error.source, field=error.field, value=error.value)
-
-
-def _save_preview(
-    args: argparse.Namespace,
-    net: NetClass,
-    drawn: DrawnNetwork,
-    findings: Sequence[Finding],
-    units: Units | None,
-    refused: str | None = None,
-) -> None:
-    from ..exchange.import_summary import import_figures, import_rows
-    from ..report.import_preview import net_preview
-
-    figures = import_figures(drawn, units)
-    kept = _ends_kept_by(net)
-    rows = import_rows(figures, list(findings), units, args.opening, ends_kept_by=kept)
-    page = net_preview(args.file.name, drawn, rows, findings, units, refused)
-    page.save(args.preview, overwrite=args.overwrite)
-
-
-def _tell(
-    args: argparse.Namespace,
-    wanted: str,
-    net: NetClass,
-    drawn: DrawnNetwork,
-    findings: Sequence[Finding],
-    units: Units | None,
-) -> None:
-    """The summary of an import."""
-    from ..exchange.import_summary import import_figures, import_rows
-
-    figures = import_figures(drawn, units)
-    told = [{"kind": f.kind, "text": f.text, "places": f.places.tolist()} for f in findings]
-    data = {
-        "design": args.out,
-        "preview": args.preview,
-        "class": wanted,
-        "name": args.file.stem,
-        "summary": figures,
-        "findings": told,
-    }
-    opening = args.opening if "opening" in net.options else None
-    kept = _ends_kept_by(net)
-    tell(args, data, import_rows(figures, list(findings), units, opening, ends_kept_by=kept))
-
-
-def _require(args: argparse.Namespace, net: NetClass, *names: str) -> None:
-    from ..errors import InputError
-
-    for name in names:
-        if getattr(args, name) is None:
-            raise InputError(
-                f"{net.one} needs --{name.replace('_', '-')}{_NEEDED.get(name, '')}",
-                source=args.file,
-            )
-
-
-def _section(args: argparse.Namespace) -> dict[str, Any]:
-    width, height = args.section
-    return {"type": "rectangle", "width": width, "height": height}
-
-
-def _material(args: argparse.Namespace) -> dict[str, float]:
-    young, poisson = args.material
-    given = {
-        "young": young,
-        "poisson": poisson,
-        "density": args.density,
-        "elastic_limit": args.elastic_limit[0] if args.elastic_limit else None,
-    }
-    return {name: value for name, value in given.items() if value is not None}
+    return drawn_net(args, wanted, net)

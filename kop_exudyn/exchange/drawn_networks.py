@@ -62,6 +62,7 @@ class ReadingOptions:
     tolerance : share of the drawing's size, see `cleaned`
     largest_part : whether curves that aren't connected with the largest part are left out
     edges : whether the edges of a mesh, or graph, are the curves
+    ends_kept_by : the option that sets `free_ends`, as messages name it; "" where there is none
     """
 
     layers: Sequence[str] = ()
@@ -72,6 +73,7 @@ class ReadingOptions:
     tolerance: float = TOLERANCE
     largest_part: bool = False
     edges: bool = False
+    ends_kept_by: str = ""
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,12 @@ class DrawnNetwork:
     def _joined(self) -> CurveNetwork | InputError:
         """The network, or why there is none: found once, whoever asks again."""
         try:
-            return network(self._curves(), free_ends=self.options.free_ends, acute=True)
+            return network(
+                self._curves(),
+                free_ends=self.options.free_ends,
+                acute=True,
+                ends_kept_by=self.options.ends_kept_by,
+            )
         except InputError as error:
             named = self.named(error)
             more = self._crowded() or self._short_of(named.field) or self._advice(named)

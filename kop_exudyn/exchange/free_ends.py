@@ -30,11 +30,8 @@ def cut_ends(found: CurveNetwork) -> tuple[np.ndarray, np.ndarray]:
     return np.array(lengths), np.array(tips).reshape(-1, 2)
 
 
-def free_end_doubts(drawn: DrawnNetwork, units: Units | None, kept_by: str) -> list[Finding]:
-    """A finding where ends that are cut off are about as long as spans: they may be meant.
-
-    kept_by : the option that keeps them; "" where designs of the class have no free ends
-    """
+def free_end_doubts(drawn: DrawnNetwork, units: Units | None) -> list[Finding]:
+    """A finding where ends that are cut off are about as long as spans: they may be meant."""
     found = drawn.network
     lengths, tips = cut_ends(found)
     spans = np.concatenate([strand.lengths for strand in found.strands])
@@ -45,6 +42,7 @@ def free_end_doubts(drawn: DrawnNetwork, units: Units | None, kept_by: str) -> l
         return []
     flat = np.column_stack([tips[long], np.zeros(long.sum())]) / drawn.options.scale
     longest = with_unit(float(lengths.max()), "length", units)
+    kept_by = drawn.options.ends_kept_by
     how = f" ({kept_by} keeps ends)" if kept_by else ""
     ends = counted(int(long.sum()), "free end that is cut off is", "free ends that are cut off are")
     text = f"{ends} longer than half a span, up to {longest}: is no joint missing there?{how}"

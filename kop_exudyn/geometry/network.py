@@ -16,7 +16,6 @@ from .curves import Curve, curve_from_dict, direction
 _RIGHT = np.radians(0.5)  # means of angles this close to 90 degrees count as right ones
 _EQUAL = 1e-3  # mean difference of directions (their doubled cosines) that tells nothing
 _LEAST_LOOP = 3  # joints: two corners can't close a loop of straight pieces
-NOTHING_LEFT = "nothing is left of a curve with one joint when its free ends are cut off"
 
 
 @dataclass(frozen=True)
@@ -123,6 +122,7 @@ def network(
     free_ends: bool = False,
     *,
     acute: bool = False,
+    ends_kept_by: str = "",
 ) -> CurveNetwork:
     """Join curves where they cross.
 
@@ -130,6 +130,7 @@ def network(
     free_ends : whether curves go on beyond their first and last joint
     acute : whether the first family is chosen by the shape of the net (see `acute_first`), so that
         the order in which the curves are given tells nothing; otherwise it is that of the first one
+    ends_kept_by : what a reader sets so that free ends stay, for errors; "" where nothing does
 
     Raises InputError, naming the curve, where no structure comes of it: a curve that crosses no
     other, crosses itself, touches or overlaps another, three curves through one point, parts that
@@ -149,7 +150,9 @@ def network(
     for n, crossing in enumerate(points):
         for curve, station in zip(crossing.curves, crossing.stations):
             along[curve].append((station, n))
-    strands = tuple(_strand(curve, sorted(own), free_ends) for curve, own in zip(curves, along))
+    strands = tuple(
+        _strand(curve, sorted(own), free_ends, ends_kept_by) for curve, own in zip(curves, along)
+    )
     place = [{joint: k for k, joint in enumerate(s.joints.tolist())} for s in strands]
     places = np.array([[place[c][n] for c in pair] for n, pair in enumerate(pairs.tolist())])
     found = CurveNetwork(
@@ -165,12 +168,8 @@ def network_from_dict(data: Mapping[str, Any]) -> CurveNetwork:
     """
     curves = [curve_from_dict(entry, f"curves[{k}]") for k, entry in enumerate(data["curves"])]
     crossings, free_ends = data.get("crossings", "find"), bool(data.get("free_ends", False))
-    try:
-        return network(curves, crossings, free_ends, acute=data.get("version", 1) > 1)
-    except InputError as error:
-        if error.message == NOTHING_LEFT:
-            raise InputError(f"{NOTHING_LEFT} (free_ends keeps them)", field=error.field) from None
-        raise
+    acute = data.get("version", 1) > 1
+    return network(curves, crossings, free_ends, acute=acute, ends_kept_by="free_ends")
 
 
 def acute_first(network: CurveNetwork) -> CurveNetwork:
@@ -243,7 +242,9 @@ def middle_joint(positions: np.ndarray) -> int:
     return int(np.argmax(distances <= distances.min() + TOLERANCE * distances.max()))
 
 
-def _strand(curve: Curve, own: Sequence[tuple[float, int]], free_ends: bool) -> Strand:
+def _strand(
+    curve: Curve, own: Sequence[tuple[float, int]], free_ends: bool, ends_kept_by: str
+) -> Strand:
     """A curve as the network uses it; own: stations and numbers of its joints, in order."""
     stations, joints = np.array([s for s, _ in own]), np.array([n for _, n in own])
     if curve.closed and len(own) < _LEAST_LOOP:
@@ -252,7 +253,11 @@ def _strand(curve: Curve, own: Sequence[tuple[float, int]], free_ends: bool) -> 
             field=curve.field,
         )
     if len(own) == 1 and not free_ends:
-        raise InputError(NOTHING_LEFT, field=curve.field)
+        how = f" ({ends_kept_by} keeps them)" if ends_kept_by else ""
+        raise InputError(
+            f"nothing is left of a curve with one joint when its free ends are cut off{how}",
+            field=curve.field,
+        )
     head, tail = (
         (0.0, 0.0) if curve.closed or not free_ends else (stations[0], curve.length - stations[-1])
     )

@@ -41,12 +41,12 @@ def test_lengths_and_tips_of_what_is_cut_off():
 
 
 def test_ends_as_long_as_spans_are_doubted_where_they_are():
-    options = ReadingOptions(scale=10.0)
-    (doubt,) = free_end_doubts(drawn_network(net((0, 0.3, 0.9)), options), Units("cm"), "--keep")
+    options = ReadingOptions(scale=10.0, ends_kept_by="--keep")
+    (doubt,) = free_end_doubts(drawn_network(net((0, 0.3, 0.9)), options), Units("cm"))
     assert doubt.kind == "suspicious" and doubt.places.tolist() == [[2.0, 2.9, 0.0]]
     assert "1 free end that is cut off is longer" in doubt.text and "up to 9 cm" in doubt.text
     assert "--keep keeps ends" in doubt.text
-    assert not free_end_doubts(drawn_network(net((0, 0.3, 0.4)), options), None, "--keep")
+    assert not free_end_doubts(drawn_network(net((0, 0.3, 0.4)), options), None)
 
 
 def test_the_import_tells_and_names_the_option(tmp_path, capsys):

@@ -65,7 +65,7 @@ def test_limits_are_taken_in_until_none_is_exceeded():
     search_solve = dual._Search.solve
 
     def counted(self, solver):
-        rounds.append(len(self.d))
+        rounds.append(len(self.taken))
         return search_solve(self, solver)
 
     with pytest.MonkeyPatch.context() as patch:
@@ -79,7 +79,7 @@ def test_limits_are_taken_in_until_none_is_exceeded():
     # a wrong solution doesn't pass for one
     with pytest.MonkeyPatch.context() as patch:
         own = dual._Search.take_in
-        patch.setattr(dual._Search, "take_in", lambda self: not self._of and own(self))
+        patch.setattr(dual._Search, "take_in", lambda self: not len(self.taken) and own(self))
         assert solve_by_dual(qp, bounds, 0.7, QPSolver()) is None
 
 
