@@ -63,7 +63,7 @@ def main() -> None:
     levels = QUICK if study.quick else tuple(LEVELS)
     for case in cases:
         kits: dict[str, KitResult] = {}
-        folder = run_folder(replace(case, name=f"{case.name} with snow"), study)
+        folder = run_folder(f"{case.name} with snow", study)
         loaded = replace(case, files=select_files(with_snow(list(case.files), folder)))
         for level in levels:
             result = kit_of(*required(loaded, level, LEVELS[level], study), study.jobs)
@@ -125,7 +125,7 @@ def required(
     )
     name = f"{case.name} {level.removeprefix('+ ')} required"
     named = replace(case, name=name, stages=stages, baselines=False, published=False)
-    return named, run_folder(named, study)
+    return named, run_folder(named.name, study)
 
 
 def design_rows(name: str, level: str, result: KitResult) -> list[dict[str, Any]]:
@@ -191,15 +191,14 @@ def finding(rows: list[dict[str, Any]]) -> str:
     sentences = _in_all(rows)
     for level in dict.fromkeys(row["required"] for row in rows):
         own = [row for row in rows if row["required"] == level]
-        opened = [row["opened max %"] for row in own if row["opened max %"] is not None]
+        opened = _opened(own)
         opens = sum(row["opens"] for row in own)
         more = []
         used = [row["utilisation"] for row in own if row["utilisation"] is not None]
         if used:
             more.append(f"stress up to {100 * max(used):.0f} % of the limit")
-        tried = sum(row["samples"] or 0 for row in own)
-        if tried:
-            more.append(f"{sum(row['snapped'] or 0 for row in own)} of {tried} samples snap")
+        if snapped := _snapped(own):
+            more.append(f"{snapped} samples snap")
         snow = [row["snow"] for row in own if row["snow"] is not None]
         if snow:
             more.append(f"{sum(value <= CARRIED for value in snow)} of {len(snow)} carry the snow")
@@ -216,6 +215,18 @@ def finding(rows: list[dict[str, Any]]) -> str:
     return " ".join(sentences)
 
 
+def _opened(rows: list[dict[str, Any]]) -> list[float]:
+    """Largest deviations of the designs that open."""
+    return [row["opened max %"] for row in rows if row["opened max %"] is not None]
+
+
+def _snapped(rows: list[dict[str, Any]]) -> str:
+    """Of how many samples so many snap, which differs: where one of a few does, more are tried; ""
+    where none was tried."""
+    tried = sum(row["samples"] or 0 for row in rows)
+    return f"{sum(row['snapped'] or 0 for row in rows)} of {tried}" if tried else ""
+
+
 def _in_all(rows: list[dict[str, Any]]) -> list[str]:
     """A sentence on the last level against the first one; none where there is one only."""
     levels = list(dict.fromkeys(row["required"] for row in rows))
@@ -226,7 +237,7 @@ def _in_all(rows: list[dict[str, Any]]) -> list[str]:
     )
     medians = []
     for own in (without, with_all):
-        opened = [row["opened max %"] for row in own if row["opened max %"] is not None]
+        opened = _opened(own)
         medians.append(f"{np.median(opened):.2g} %" if opened else "nowhere")
     text = (
         f"Where all is required, {sum(row['opens'] for row in with_all)} of {len(with_all)} "
@@ -234,11 +245,8 @@ def _in_all(rows: list[dict[str, Any]]) -> list[str]:
         f"and the median of their largest deviation, as they open, is {medians[1]} of the target "
         f"instead of {medians[0]}"
     )
-    shares = []  # where one of a few samples snaps, more are tried
-    for own in (without, with_all):
-        tried = sum(row["samples"] or 0 for row in own)
-        shares.append(f"{sum(row['snapped'] or 0 for row in own)} of {tried}" if tried else "none")
-    snaps = f"; {shares[1]} samples snap instead of {shares[0]}" if shares[1] != "none" else ""
+    before, now = _snapped(without), _snapped(with_all)
+    snaps = f"; {now} samples snap instead of {before or 'none'}" if now else ""
     return [f"{text}{snaps}."]
 
 

@@ -98,9 +98,9 @@ def write(study: Study, found: Sequence[Found], missing: Sequence[str]) -> None:
     outcome = " ".join(sentence(one) for one in found)
     if missing:
         outcome += f" Not run yet: {', '.join(missing)}."
-    report = study.report(outcome)
+    report, several = study.report(outcome), len(found) + len(missing) > 1
     for one in found:
-        kind, name = one.case.kind, one.case.name.replace(" ", "_")
+        kind, suffix = one.case.kind, f"_{one.case.name.replace(' ', '_')}" if several else ""
         fixed = "".join(f" and {n} {other}" for other, n in one.case.others.items())
         report.section(
             one.case.name[0].upper() + one.case.name[1:],
@@ -108,7 +108,7 @@ def write(study: Study, found: Sequence[Found], missing: Sequence[str]) -> None:
             f"{kind}{fixed} parts.",
         )
         report.figure(
-            f"tradeoff_{name}" if len(found) + len(missing) > 1 else "tradeoff",
+            f"tradeoff{suffix}",
             drawn(one),
             f"Figures of every kit against its number of {kind} parts"
             + ("; the dotted line marks the knee." if one.at is not None else ".")
@@ -117,7 +117,7 @@ def write(study: Study, found: Sequence[Found], missing: Sequence[str]) -> None:
             alt=f"deviation, kit size, energy, time over {kind} parts",
         )
         report.table(
-            f"kits_{name}" if len(found) + len(missing) > 1 else "kits",
+            f"kits{suffix}",
             [{name: row[name] for name in (kind, *COLUMNS)} for row in one.rows],
             "max and mean: of the joints' deviations; energy ratio: mean over the designs; J: the "
             "objective; from: the kit whose parts were split or merged; seconds: of the search "

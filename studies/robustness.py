@@ -47,7 +47,7 @@ def main() -> None:
             case.name,
             robustness_of_run,
             {
-                "run": run_folder(case, study) / "result.json",
+                "run": run_folder(case.name, study) / "result.json",
                 "files": list(case.files),
                 "share": SHARE,
                 "angle": ANGLE,

@@ -25,7 +25,7 @@ from ..search.run import optimize_kit
 from ..search.settings import JobSettings
 from ..search.stage_results import StageResult
 from ..structures.base import Design
-from ..structures.strength import strength_summary
+from ..structures.strength import largest_utilisation, strength_summary
 from .reuse import counts_of, fabricated, kit_size_percent
 
 log = logging.getLogger(__name__)
@@ -136,17 +136,13 @@ def unmet(result: KitResult, required: Requirements) -> list[str]:
             found.append(f"{design.name} snaps with errors of the workshop")
         if not required.stress:
             continue
-        given = _utilisation(strength_summary(design, result.references[n].equilibria))
-        used = _utilisation(result.summary("assigned", n).get("strength", {}))
+        given = (
+            largest_utilisation(strength_summary(design, result.references[n].equilibria)) or 0.0
+        )
+        used = largest_utilisation(result.summary("assigned", n).get("strength", {})) or 0.0
         if required.safety * given <= 1 < required.safety * used - _EXCESS:
             found.append(f"{design.name} is stressed to {used:.2f} of its limit")
     return found
-
-
-def _utilisation(strength: Mapping[str, Mapping[str, Any]]) -> float:
-    """The largest of all states; 0 where none is known."""
-    known = [state["utilisation"] for state in strength.values()]
-    return max((value for value in known if value is not None), default=0.0)
 
 
 def smallest_kit(

@@ -153,14 +153,14 @@ class Sensitivities:
         """Gradient (n_parameters,) of J given dJ/d(generalised stresses) (E, 6): one solve, no
         x_q."""
         explicit = np.einsum("er,er->e", self._stress_L, cotangent)
-        return self._by_parameter(explicit) + self._by_load(self._scattered(cotangent))
+        return self._system.scene.by_parameter(explicit) + self._by_load(self._scattered(cotangent))
 
     # -- energies ------------------------------------------------------------------------------
     @cached_property
     def potential_gradient(self) -> Parameters:
         """d(potential)/dq (n_parameters,): by the envelope theorem only the explicit part
         counts."""
-        explicit = self._by_parameter(self._energy_L + self._weight_energy_L())
+        explicit = self._system.scene.by_parameter(self._energy_L + self._weight_energy_L())
         return explicit + self._driven_map.T @ self._gradient[self._n :]
 
     @cached_property
@@ -169,7 +169,9 @@ class Sensitivities:
         adjoint solve."""
         if not self._loaded:
             return self.potential_gradient
-        return self._by_parameter(self._energy_L) + self._by_load(self._elastic_gradient())
+        return self._system.scene.by_parameter(self._energy_L) + self._by_load(
+            self._elastic_gradient()
+        )
 
     @cached_property
     def potential_hessian(self) -> ParameterHessian:
@@ -264,15 +266,6 @@ class Sensitivities:
         return sp.csr_matrix(
             (d.factors, (np.arange(len(d.dofs)), d.parameters)),
             shape=(len(d.dofs), self._system.scene.n_parameters),
-        )
-
-    def _by_parameter(self, per_element: np.ndarray) -> np.ndarray:
-        """Sum element values (E,), derivatives in the rest length, into their parameters."""
-        scene, has = self._system.scene, self._has
-        return np.bincount(
-            scene.length_parameter[has],
-            scene.length_factor[has] * per_element[has],
-            minlength=scene.n_parameters,
         )
 
     def _differentiate_by_length(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

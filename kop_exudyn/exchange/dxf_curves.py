@@ -229,7 +229,8 @@ def _exploded(
     for entity in entities:
         if entity.dxftype() == "ATTDEF":  # a form, which insertions fill in
             continue
-        _add(count, 1)
+        count[0] += 1
+        _refuse_many(count[0])
         # entities that only the drawing's program knows have no layer
         own = entity.dxf.layer if entity.dxf.is_supported("layer") else ""
         of_outer = outer is not None and (own == "0" or outer.layer.lower() in frozen)
@@ -251,7 +252,7 @@ def _exploded(
         contents = len(entity.block())
         if not contents:
             continue
-        _add([*count], entity.mcount * contents)
+        _refuse_many(count[0] + entity.mcount * contents)
         for single in entity.multi_insert() if entity.mcount > 1 else (entity,):
             matrix = single.matrix44()
             matrix = matrix if placed.matrix is None else matrix * placed.matrix
@@ -261,10 +262,9 @@ def _exploded(
             yield from _exploded(entity.block(), frozen, inner, name, depth + 1, count)
 
 
-def _add(count: list[int], more: int) -> None:
-    """Count entities in place. Raises InputError where there are too many."""
-    count[0] += more
-    if count[0] > _MOST_ENTITIES:
+def _refuse_many(entities: int) -> None:
+    """Raises InputError where there are too many."""
+    if entities > _MOST_ENTITIES:
         raise InputError(f"draws more than {_MOST_ENTITIES:,} entities, blocks included")
 
 

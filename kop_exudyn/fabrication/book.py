@@ -8,7 +8,7 @@ from .assembly_drawing import AssemblyDrawing
 from .assembly_order import assembly_steps, fasteners
 from .assembly_pages import assembly_pages
 from .blanks import Blanks
-from .cutlist import cut_list, purchases, totals
+from .cutlist import cut_list, material
 from .cutsheets import Sheet
 from .options import Tolerances, tenths
 from .paper import Book
@@ -59,8 +59,8 @@ def workshop_book(
     rows = cut_list(blanks, tolerances)
     kept = [{name: value for name, value in row.items() if name not in _ELSEWHERE} for row in rows]
     book.table("Cut list", kept, _note(blanks, tolerances))
-    material = [*totals(blanks), *purchases(blanks, sheets, plan)]
-    book.table("Material and fasteners", [*material, *fasteners(blanks)])
+    bought = [*material(blanks, sheets, plan), *fasteners(blanks)]
+    book.table("Material and fasteners", bought)
     strip_pages(book, blanks)
     plate_pages(book, blanks)
     cell_pages(book, blanks)

@@ -118,6 +118,13 @@ def totals(blanks: Blanks) -> list[dict[str, Any]]:
     return rows
 
 
+def material(
+    blanks: Blanks, sheets: Sequence[Sheet], plan: StockPlan | None
+) -> list[dict[str, Any]]:
+    """What the parts take, and what is to be bought for them: see `totals` and `purchases`."""
+    return [*totals(blanks), *purchases(blanks, sheets, plan)]
+
+
 def purchases(
     blanks: Blanks, sheets: Sequence[Sheet], plan: StockPlan | None
 ) -> list[dict[str, Any]]:
@@ -128,8 +135,7 @@ def purchases(
     """
     either = sources(blanks).either
     rows: list[dict[str, Any]] = []
-    lengths = Counter(bar.length for bar in plan.bars) if plan is not None else Counter()
-    for length, number in sorted(lengths.items(), reverse=True):
+    for length, number in (plan.counts if plan is not None else {}).items():
         rows.append(
             {
                 "item": f"to buy: bars of {length:g} mm{', or sheets' if either else ''}",

@@ -15,7 +15,7 @@ from .assembly_order import assembly_steps, fasteners
 from .assembly_pages import save_assembly_drawing
 from .blanks import Blanks
 from .book import workshop_book
-from .cutlist import purchases, totals, write_bill, write_cut_list
+from .cutlist import material, write_bill, write_cut_list
 from .cutsheets import Sheet, cut_sheets, template_sheets
 from .dxf import write_dxf
 from .options import CutOptions, Tolerances
@@ -73,7 +73,7 @@ def export_workshop(
     folder = make_folder(folder)
     done = [write_cut_list(folder / "cut_list.csv", blanks, tolerances, overwrite=overwrite)]
     tables = {
-        "material": [*totals(blanks), *purchases(blanks, sheets, bars)],
+        "material": material(blanks, sheets, bars),
         "fasteners": fasteners(blanks),
         "bars": bar_rows(bars),
     }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -207,8 +206,7 @@ def stock_pages(book: Book, blanks: Blanks, plan: StockPlan | None) -> None:
 
 def _lengths(plan: StockPlan) -> str:
     """ "5 of 4800 mm, 12 of 2400 mm": the bars of a plan, the longest first."""
-    counts = Counter(bar.length for bar in plan.bars)
-    return ", ".join(f"{counts[length]} of {length:g} mm" for length in sorted(counts)[::-1])
+    return ", ".join(f"{number} of {length:g} mm" for length, number in plan.counts.items())
 
 
 def _runs(items: Sequence[Any]) -> list[list[int]]:

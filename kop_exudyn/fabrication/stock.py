@@ -11,6 +11,7 @@ Research 38, 1990), with pieces rounded down instead of up.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -48,6 +49,11 @@ class StockPlan:
     def length(self) -> float:
         """Length of all bars, mm."""
         return sum(bar.length for bar in self.bars)
+
+    @property
+    def counts(self) -> dict[float, int]:
+        """How many bars there are of each length (mm), the longest first."""
+        return dict(sorted(Counter(bar.length for bar in self.bars).items(), reverse=True))
 
     @property
     def used(self) -> float:

@@ -11,7 +11,7 @@ from PIL import Image
 from ..analysis.load_check import LoadCheck
 from ..analysis.verdict import Buildable
 from ..search.result import KitResult
-from ..structures.strength import beyond_limit
+from ..structures.strength import beyond_limit, largest_utilisation
 from ..units import Units, in_millimetres
 from .kit_picture import png
 from .page import Card
@@ -172,9 +172,7 @@ def _largest(verdict: Buildable | None, summary: dict[str, Any]) -> float | None
     """The largest utilisation: of all states on the way where a verdict knows them."""
     if verdict is not None and verdict.largest is not None:
         return verdict.largest
-    states = summary.get("strength", {}).values()
-    known = [s["utilisation"] for s in states if s["utilisation"] is not None]
-    return max(known, default=None)
+    return largest_utilisation(summary.get("strength", {}))
 
 
 def _opening(verdict: Buildable) -> list[tuple[str, str, bool]]:

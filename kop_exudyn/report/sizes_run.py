@@ -133,9 +133,8 @@ def tradeoff_and_report(
     """
     designs = served_by(designs, sizes[-1])
     settings = within_workshop(designs, settings)
-    asked = {"sizes": [dict(size) for size in sizes]}
     with _prepared(
-        designs, sizes[-1], settings, asked, out, inputs, resume, overwrite, progress
+        designs, sizes[-1], settings, _asked(sizes), out, inputs, resume, overwrite, progress
     ) as run:
         kits = trade_off(
             designs,
@@ -167,6 +166,36 @@ def tradeoff_and_report(
     return kits
 
 
+def tradeoff_job(
+    designs: Sequence[Design],
+    sizes: Sequence[Mapping[str, int]],
+    *,
+    settings: JobSettings = JobSettings(),
+    inputs: Sequence[str | Path] = (),
+) -> Job:
+    """The job that `tradeoff_and_report` records in its folder, by which a run is known again;
+    parameters are its own."""
+    designs = served_by(designs, sizes[-1])
+    return _job(designs, sizes[-1], within_workshop(designs, settings), _asked(sizes), inputs)
+
+
+def _asked(sizes: Sequence[Mapping[str, int]]) -> dict[str, Any]:
+    return {"sizes": [dict(size) for size in sizes]}
+
+
+def _job(
+    designs: Sequence[Design],
+    parts: Mapping[str, int],
+    settings: JobSettings,
+    asked: Mapping[str, Any],
+    inputs: Sequence[str | Path],
+) -> Job:
+    job = {**described_job(designs, parts, None, settings), **asked}
+    if not inputs:
+        job["parameters"] = {design.name: digest(design.parameters) for design in designs}
+    return Job.of(plain(job), inputs)
+
+
 class _prepared:
     """A folder for the job, and a bar that tells of kits."""
 
@@ -183,12 +212,8 @@ class _prepared:
         progress: bool,
     ):
         check_request(designs, parts, None, settings)
-        job = {**described_job(designs, parts, None, settings), **asked}
-        if not inputs:
-            job["parameters"] = {design.name: digest(design.parameters) for design in designs}
-        self.folder = RunFolder.open(
-            out, Job.of(plain(job), inputs), resume=resume, overwrite=overwrite
-        )
+        job = _job(designs, parts, settings, asked, inputs)
+        self.folder = RunFolder.open(out, job, resume=resume, overwrite=overwrite)
         self._bar = progress_bar(progress)
         self._required = settings.stages.requirements
         self._given: list[Buildable] = []

@@ -165,6 +165,16 @@ class Scene:
             )
         return lengths
 
+    def by_parameter(self, per_length: np.ndarray) -> np.ndarray:
+        """(n_parameters,) derivatives of a sum over the elements, from those in their rest lengths
+        (E,)."""
+        has = np.flatnonzero(self.length_parameter >= 0)
+        return np.bincount(
+            self.length_parameter[has],
+            self.length_factor[has] * per_length[has],
+            minlength=self.n_parameters,
+        )
+
     def length_derivative(self, elements: np.ndarray) -> np.ndarray:
         """Derivatives (m, n_parameters) of some elements' rest lengths."""
         out = np.zeros((len(elements), self.n_parameters))

@@ -45,7 +45,7 @@ def dask_client(scheduler: str) -> Client:
 
 def check_cluster(scheduler: str) -> None:
     """Raises InputError as `Cluster`, before anything is begun."""
-    Cluster(scheduler, int, ()).close()
+    _usable_client(scheduler).close()
 
 
 class Cluster:
@@ -60,11 +60,9 @@ class Cluster:
     """
 
     def __init__(self, scheduler: str, start: Callable[..., object], arguments: Sequence[Any]):
-        self._client = dask_client(scheduler)
-        try:
-            self.size = self._checked(scheduler)
-            self._key = uuid.uuid4().hex
-            # once to every worker, not with every task
+        self._client = _usable_client(scheduler)
+        self._key = uuid.uuid4().hex
+        try:  # once to every worker, not with every task
             [self._given] = self._client.scatter([(start, tuple(arguments))], broadcast=True)
         except BaseException:
             self._client.close()
@@ -94,30 +92,36 @@ class Cluster:
         """Leave the cluster; it goes on running."""
         self._client.close()
 
-    def _checked(self, scheduler: str) -> int:
-        threads = self._client.nthreads()
-        if not threads:
-            raise InputError(
-                "the Dask scheduler has no workers: start some with `dask worker ADDRESS "
-                "--nthreads 1`",
-                field="scheduler",
-                value=scheduler,
-            )
-        if many := [worker for worker, count in threads.items() if count != 1]:
-            raise InputError(
-                f"{len(many)} of {len(threads)} workers of the Dask scheduler have more than one "
-                f"thread: start them with --nthreads 1",
-                field="scheduler",
-                value=scheduler,
-            )
-        if other := [code for code in self.everywhere(code_digest) if code != code_digest()]:
-            raise InputError(
-                f"{len(other)} of {len(threads)} workers of the Dask scheduler run another version "
-                f"of kop_exudyn than this one",
-                field="scheduler",
-                value=scheduler,
-            )
-        return len(threads)
+
+def _usable_client(scheduler: str) -> Client:
+    """A client of workers that can be worked with; see `Cluster`."""
+    client = dask_client(scheduler)
+    try:
+        threads = client.nthreads()
+        codes = list(client.run(code_digest).values())
+    except BaseException:
+        client.close()
+        raise
+    several = sum(count != 1 for count in threads.values())
+    other = sum(code != code_digest() for code in codes)
+    if not threads:
+        wrong = (
+            "the Dask scheduler has no workers: start some with `dask worker ADDRESS --nthreads 1`"
+        )
+    elif several:
+        wrong = (
+            f"{several} of {len(threads)} workers of the Dask scheduler have more than one thread: "
+            f"start them with --nthreads 1"
+        )
+    elif other:
+        wrong = (
+            f"{other} of {len(threads)} workers of the Dask scheduler run another version of "
+            f"kop_exudyn than this one"
+        )
+    else:
+        return client
+    client.close()
+    raise InputError(wrong, field="scheduler", value=scheduler)
 
 
 def _run(

@@ -46,16 +46,15 @@ def level(stages: Stages, result: StageResult, numbers: Iterator[int]) -> StageR
     before = stages.confirmed(result)  # and placed best
     settings = stages.settings
     secured = demands.secured(stages, forgiving=True, but=result.snapping)
-
-    def levelled(minding: Stages) -> Stages:
-        return demands.levelled(
-            demands.secured(minding, forgiving=True, but=result.snapping), share
-        )
-
-    start = levelled(stages).kept(levelled(stages).weighed(result))
+    own = demands.levelled(secured, share)
+    start = own.kept(own.weighed(result))
     if start.value is None:
         return result
     ends: list[StageResult] = []
+
+    def levelled(minding: Stages) -> Stages:
+        kept = demands.secured(minding, forgiving=True, but=result.snapping)
+        return demands.levelled(kept, share)
 
     def stepped(minding: Stages) -> StageResult:
         label = SQPLabel.of_levelling(next(numbers))

@@ -50,9 +50,8 @@ def minded(
         ends.append(run(stages))
         if seen is not None:
             seen.append(ends[-1])
-        weighed = demands.secured(stages).weighed(
-            ends[-1]
-        )  # where distances are measured depends on it
+        # where distances are measured depends on the weights
+        weighed = demands.secured(stages).weighed(ends[-1])
         lost = demands.unproved(stages, weighed, members) if weighed.value is not None else ()
         if not lost:
             return Minded(ends[-1], stages, True)

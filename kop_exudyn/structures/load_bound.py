@@ -13,7 +13,7 @@ with u_q, u_p from the sensitivities of the loaded scene and dx_s/dq from those 
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,7 +27,7 @@ from ..errors import SimulationFailure
 from ..scene.assembly import ENERGY, GRADIENT
 from ..scene.scene import Driven, Scene
 from .base import Design
-from .loading import acting_loads, held_scene, loaded_scene
+from .loading import held_scene, loaded_scene
 from .loads import LoadCase
 from .opening import SAME_STATE
 from .stress_bound import MOST_ROWS, NEAR, Rows, StressBound
@@ -45,14 +45,12 @@ class _Asked:
 
     factor : of the loads
     scene : under them
-    loads : the same scene with nothing but them: rods without stiffness, no other terms
     stress : bound on its stress, or None
     deflection : whether it is bounded
     """
 
     factor: float
     scene: Scene
-    loads: Scene
     stress: StressBound | None
     deflection: bool
 
@@ -88,8 +86,7 @@ class LoadBound:
             scene = loaded_scene(design, self._scene, unloaded, case, factor)
             bound = StressBound(design, scene, safety) if safety is not None else None
             strong = bound if bound is not None and bound.known and factor == case.factor else None
-            loads = _only_loads(design, self._scene, unloaded, case, factor)
-            self._steps.append(_Asked(factor, scene, loads, strong, bounded and factor == 1.0))
+            self._steps.append(_Asked(factor, scene, strong, bounded and factor == 1.0))
 
     @property
     def states(self) -> list[str]:
@@ -179,10 +176,7 @@ class LoadBound:
         if (weight := system.scene.weight) is not None:
             x0, x1 = (self._scene.node_poses(s.state)[0] for s in (unloaded, loaded))
             mean = (x1 - x0)[self._scene.elements].mean(axis=1)
-            lengths, factors = self._scene.length_parameter, self._scene.length_factor
-            has = np.flatnonzero(lengths >= 0)
-            by_length = factors * np.einsum("ei,ei->e", weight, mean)
-            found += np.bincount(lengths[has], by_length[has], minlength=nq)[:nq]
+            found += self._scene.by_parameter(np.einsum("ei,ei->e", weight, mean))[:nq]
         return found
 
     def stiffness_product(
@@ -287,17 +281,26 @@ class LoadBound:
 
     def _system(self, asked: _Asked) -> System:
         """The workspace of a loaded scene; each thread has its own."""
-        return self._workspace("systems", asked.factor, asked.scene)
+        return self._workspace("systems", asked.factor, lambda: asked.scene)
 
     def _loads(self, factor: float) -> System:
         """The workspace of the loads alone."""
-        return self._workspace("loads", factor, self._of(factor).loads)
+        return self._workspace("loads", factor, lambda: self._only_loads(factor))
 
-    def _workspace(self, kind: str, factor: float, scene: Scene) -> System:
+    def _workspace(self, kind: str, factor: float, scene: Callable[[], Scene]) -> System:
         systems: dict[float, System] = self._own.__dict__.setdefault(kind, {})
         if factor not in systems:
-            systems[factor] = System(scene)
+            systems[factor] = System(scene())
         return systems[factor]
+
+    def _only_loads(self, factor: float) -> Scene:
+        """What a factor of the loads adds to the held scene, whose potential is theirs alone."""
+        held, loaded = self._scene, self._of(factor).scene
+        weight = loaded.weight
+        if weight is not None and held.weight is not None:
+            weight = weight - held.weight
+        bare = replace(loaded, stiffness=np.zeros_like(loaded.stiffness), weight=weight)
+        return bare.with_terms(*loaded.terms[len(held.terms) :])
 
     @property
     def _places(self) -> np.ndarray:
@@ -315,16 +318,6 @@ class LoadBound:
     def _names(self, asked: _Asked) -> list[str]:
         found = [self._stress] if asked.stress is not None else []
         return found + ([self._deflection] if asked.deflection else [])
-
-
-def _only_loads(
-    design: Design, scene: Scene, unloaded: Equilibrium, case: LoadCase, factor: float
-) -> Scene:
-    """What a factor of the loads adds to the held scene, whose potential is theirs alone."""
-    bare = replace(scene, weight=None)
-    heavy, acting = acting_loads(design, bare, unloaded, case, factor)
-    soft = replace(heavy, stiffness=np.zeros_like(heavy.stiffness))
-    return soft.with_terms(*(term for terms in acting.values() for term in terms))
 
 
 def with_places(scene: Scene, dofs: np.ndarray) -> Scene:

@@ -131,6 +131,12 @@ def strength_summary(
     }
 
 
+def largest_utilisation(summary: Mapping[str, Mapping[str, Any]]) -> float | None:
+    """The largest of all roles of a `strength_summary`; None where none is known."""
+    known = [state["utilisation"] for state in summary.values()]
+    return max((value for value in known if value is not None), default=None)
+
+
 def materials_of(design: Design) -> tuple[Material, ...]:
     """Materials among a design's attributes, and among the fields of the dataclasses there, in a
     fixed order."""

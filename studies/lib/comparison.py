@@ -18,6 +18,7 @@ from kop_exudyn.drawing.style import INK, PALETTE, QUIET, style
 from kop_exudyn.report.designs import DrawnDesign
 from kop_exudyn.search.buckling import buckled
 from kop_exudyn.search.result import STAGES, KitResult
+from kop_exudyn.structures.strength import largest_utilisation
 
 Row = Mapping[str, Any]
 
@@ -42,7 +43,6 @@ _MARKERS = {
     "relaxed": "D",
     "assigned": "o",
 }
-
 
 # stages that kits are compared with, as sentences name them
 BASELINES = {"direct": "direct", "unrelaxed": "unrelaxed", "published_opened": "published method"}
@@ -77,7 +77,7 @@ def comparison_rows(class_name: str, result: KitResult) -> list[dict[str, Any]]:
             f"{told(stage)} energy": summary.get("energy_ratio") for stage, summary in found.items()
         }
         row |= {
-            f"{told(stage)} utilisation": _utilisation(found[stage])
+            f"{told(stage)} utilisation": largest_utilisation(found[stage].get("strength", {}))
             for stage in BASELINES
             if stage in found
         }
@@ -111,13 +111,6 @@ def _verdict(result: KitResult, number: int) -> dict[str, Any]:
     }
 
 
-def _utilisation(summary: Mapping[str, Any]) -> float | None:
-    """The largest of a stage's states, of the elastic limit; None where none is known."""
-    states = (summary.get("strength") or {}).values()
-    known = [state["utilisation"] for state in states if state.get("utilisation") is not None]
-    return max(known, default=None)
-
-
 def _beyond(row: Row, stage: str) -> str:
     """That a stage is stressed beyond the elastic limit, which the kit found here keeps."""
     used = row.get(f"{told(stage)} utilisation")
@@ -127,11 +120,10 @@ def _beyond(row: Row, stage: str) -> str:
 def finding(rows: Sequence[Row]) -> str:
     """What the rows say, in a few sentences: first what the method gains, then where it is worse
     than a baseline, then what can't be built."""
-    names = BASELINES
-    values = {stage: _values(rows, f"{told(stage)} max %") for stage in (*names, "assigned")}
+    values = {stage: _values(rows, f"{told(stage)} max %") for stage in (*BASELINES, "assigned")}
     medians = ", ".join(
         f"{np.median(values[stage]):.2g} % ({name})"
-        for stage, name in names.items()
+        for stage, name in BASELINES.items()
         if values[stage]
     )
     sentences = []
@@ -144,14 +136,13 @@ def finding(rows: Sequence[Row]) -> str:
             f"before: {medians}. The worst design ends at {max(values['assigned']):.2g} %."
         )
     worse = [
-        f"{row['design']} ({name}: {row[key]:.2g} %{_beyond(row, stage)}, here "
+        f"{row['design']} ({name}: {value:.2g} %{_beyond(row, stage)}, here "
         f"{row['assigned max %']:.2g} %)"
         for row in rows
-        for stage, name in names.items()
-        for key in (f"{told(stage)} max %",)
-        if row.get(key) is not None
+        for stage, name in BASELINES.items()
+        if (value := row.get(f"{told(stage)} max %")) is not None
         and row["assigned max %"] is not None
-        and row[key] < row["assigned max %"]
+        and value < row["assigned max %"]
     ]
     if worse:
         sentences.append(f"Worse than a baseline: {', '.join(worse)}.")

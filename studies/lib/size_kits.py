@@ -9,13 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from kop_exudyn.errors import InputError, SimulationFailure
-from kop_exudyn.files.json_files import plain, read_json, write_json
+from kop_exudyn.errors import SimulationFailure
+from kop_exudyn.files.json_files import read_json
 from kop_exudyn.io.datasets import select_files
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.io.saved_runs import load_run
-from kop_exudyn.provenance import code_digest
-from kop_exudyn.report.sizes_run import tradeoff_and_report
+from kop_exudyn.report.sizes_run import tradeoff_and_report, tradeoff_job
 from kop_exudyn.search.checkpoints import NoStore
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.evaluation import Evaluation
@@ -29,12 +28,12 @@ from kop_exudyn.search.weights import Weights
 from kop_exudyn.structures.base import Design
 
 from .study import Study
+from .study_kits import is_run_of, run_folder
 from .study_tasks import QUICK, changed, stages_of
 from .sweep import Task
 
 # many kits, each of which goes on from a neighbour: fewer rounds than one from scratch
 FULL = StageSettings(reassignments=2, leaps=0)
-_DONE = "done.json"
 
 
 @dataclass(frozen=True)
@@ -93,55 +92,29 @@ def sized_cases(models: Path, quick: bool = False) -> list[SizedCase]:
 
 
 def kits_by_size(study: Study, case: SizedCase) -> list[KeptKit]:
-    """The kits of a case, the smallest first: those of a finished run of the same code, or of a new
+    """The kits of a case, the smallest first: those of a finished run of the same job, or of a new
     run, which goes on from checkpoints."""
-    runs = study.out.parent / ("quick_runs" if study.quick else "runs")
-    folder = runs / f"{case.name} by size".replace(" ", "_")
+    folder = run_folder(f"{case.name} by size", study)
+    designs, files = [load_design(file) for file in case.files], list(case.files)
     stages = QUICK if study.quick else FULL
-    designs = [load_design(file) for file in case.files]
-    made_of = plain(
-        {
-            "code": code_digest(),
-            "files": [file.name for file in case.files],
-            "sizes": case.sizes,
-            "stages": changed(stages),
-        }
-    )
-    if not _is_done(folder, made_of):
-        _search(folder, case, designs, JobSettings(stages=stages, jobs=study.jobs, baselines=False))
-        write_json(folder / _DONE, made_of, overwrite=True)
+    settings = JobSettings(stages=stages, jobs=study.jobs, baselines=False)
+    sizes = [case.parts(size) for size in case.sizes]
+    page = folder / "index.html"  # which is written last
+    same = is_run_of(folder, tradeoff_job(designs, sizes, settings=settings, inputs=files))
+    if not (same and page.exists()):
+        page.unlink(missing_ok=True)
+        tradeoff_and_report(
+            designs,
+            sizes,
+            out=folder,
+            settings=settings,
+            inputs=files,
+            resume=same,
+            overwrite=True,
+        )
     rows = read_json(folder / "tradeoff.json")["kits"]
     study.kits_s |= {f"{case.name}, {row[case.kind]}": row["seconds"] for row in rows}
     return [KeptKit(row[case.kind], row, _kept(folder, case, row, designs)) for row in rows]
-
-
-def _is_done(folder: Path, made_of: Mapping[str, Any]) -> bool:
-    """Whether a folder has all that is asked for."""
-    if not (folder / _DONE).exists():
-        return False
-    found: Mapping[str, Any] = read_json(folder / _DONE)
-    return found == made_of
-
-
-def _search(
-    folder: Path, case: SizedCase, designs: Sequence[Design], settings: JobSettings
-) -> None:
-    """Seek all kits, from the checkpoints of an interrupted run where it was the same."""
-    for resume in ([True] if folder.exists() else []) + [False]:
-        try:
-            tradeoff_and_report(
-                designs,
-                [case.parts(size) for size in case.sizes],
-                out=folder,
-                settings=settings,
-                inputs=list(case.files),
-                resume=resume,
-                overwrite=True,
-            )
-            return
-        except InputError:  # checkpoints of another job
-            if not resume:
-                raise
 
 
 def _kept(

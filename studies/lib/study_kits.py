@@ -122,16 +122,21 @@ def kits(study: Study, models: Path) -> dict[str, KitResult]:
 
 def kits_of(study: Study, cases: Sequence[KitCase]) -> dict[str, KitResult]:
     """The kits of several cases by name."""
-    found = {case.name: kit_of(case, run_folder(case, study), study.jobs) for case in cases}
+    found = {case.name: kit_of(case, run_folder(case.name, study), study.jobs) for case in cases}
     study.kits_s |= {name: result.wall_s for name, result in found.items()}
     return found
 
 
-def run_folder(case: KitCase, study: Study) -> Path:
-    """Where the run of a case is kept: beside all reports, for all studies that look at it."""
-    return (
-        study.out.parent / ("quick_runs" if study.quick else "runs") / case.name.replace(" ", "_")
-    )
+def run_folder(name: str, study: Study) -> Path:
+    """Where the run of a case of that name is kept: beside all reports, for all studies that look
+    at it."""
+    return study.out.parent / ("quick_runs" if study.quick else "runs") / name.replace(" ", "_")
+
+
+def is_run_of(folder: Path, job: Job) -> bool:
+    """Whether a folder has the checkpoints of this very job."""
+    record = folder / "checkpoints" / "job.json"
+    return record.exists() and Job.load(record).difference(job) is None
 
 
 def kit_of(case: KitCase, folder: Path, jobs: int) -> KitResult:
@@ -147,9 +152,7 @@ def kit_of(case: KitCase, folder: Path, jobs: int) -> KitResult:
             stages=case.stages, jobs=jobs, baselines=case.baselines, published=case.published
         ),
     )
-    record = folder / "checkpoints" / "job.json"
-    job = Job.of(described_job(designs, case.parts, None, settings), files)
-    same = record.exists() and Job.load(record).difference(job) is None
+    same = is_run_of(folder, Job.of(described_job(designs, case.parts, None, settings), files))
     if same and (folder / "result.json").exists():
         try:
             return load_run(folder, designs)

@@ -3,10 +3,10 @@ be used."""
 
 from __future__ import annotations
 
-from functools import wraps
-
+import distributed
 import numpy as np
 import pytest
+from support.dask_clusters import hurried, local_cluster
 
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.datasets import load_designs
@@ -17,7 +17,6 @@ from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
 
-distributed = pytest.importorskip("distributed")
 pytestmark = pytest.mark.filterwarnings("ignore")  # of the cluster's own libraries
 
 PARTS = {"linear": 4, "angular": 2}
@@ -36,16 +35,6 @@ STAGES = StageSettings(
 )
 
 
-def local(workers: int, threads: int = 1):
-    return distributed.LocalCluster(
-        n_workers=workers,
-        threads_per_worker=threads,
-        processes=True,
-        dashboard_address=None,
-        host="127.0.0.1",
-    )
-
-
 def test_the_same_kit_as_alone(repository):
     designs = load_designs(repository / "models" / "small")[:2]
 
@@ -54,7 +43,7 @@ def test_the_same_kit_as_alone(repository):
         return optimize_kit(designs, PARTS, settings=settings)
 
     alone = found(jobs=1)
-    with local(2) as cluster:
+    with local_cluster(2) as cluster:
         there = found(scheduler=cluster.scheduler_address)
         verdicts = kit_verdicts(there, scheduler=cluster.scheduler_address)
     np.testing.assert_array_equal(there.kit.vector, alone.kit.vector)
@@ -67,18 +56,18 @@ def test_the_same_kit_as_alone(repository):
 
 
 def test_clusters_that_cannot_be_used_are_refused(monkeypatch):
-    with local(1, threads=2) as cluster:
+    with local_cluster(1, threads=2) as cluster:
         many = pytest.raises(InputError, match="1 of 1 .*more than one thread.*--nthreads 1")
         with many:
             Cluster(cluster.scheduler_address, int, ())
-    with local(1) as cluster:
+    with local_cluster(1) as cluster:
         monkeypatch.setattr(clusters, "code_digest", _another_version)
         other = pytest.raises(InputError, match="1 of 1 workers .* run another version")
         with other:
             Cluster(cluster.scheduler_address, int, ())
-    with local(0) as cluster, pytest.raises(InputError, match="has no workers: start some"):
+    with local_cluster(0) as cluster, pytest.raises(InputError, match="has no workers: start some"):
         Cluster(cluster.scheduler_address, int, ())
-    monkeypatch.setattr(distributed, "Client", _hurried(distributed.Client))
+    monkeypatch.setattr(distributed, "Client", hurried(distributed.Client))
     with pytest.raises(InputError, match="no Dask scheduler answers"):
         Cluster("tcp://127.0.0.1:9", int, ())
 
@@ -89,11 +78,3 @@ def _another_version():
 
     # here it is replaced, in the workers it isn't
     return code_digest() if cluster.code_digest is code_digest else "another"
-
-
-def _hurried(client):
-    @wraps(client)
-    def connect(address, timeout, **options):
-        return client(address, timeout=1, **options)
-
-    return connect

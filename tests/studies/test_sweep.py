@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from functools import wraps
 from pathlib import Path
 
 import distributed
 import numpy as np
 import pytest
+from support.dask_clusters import hurried, local_cluster
 
 from kop_exudyn.errors import InputError, SimulationFailure
 from lib.sweep import Task, digests, run_sweep
@@ -173,9 +173,7 @@ def test_a_dying_worker_costs_only_its_task(tmp_path):
 
 @pytest.mark.filterwarnings("ignore")
 def test_a_local_cluster_of_two_workers_gives_the_same(tmp_path):
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, host="127.0.0.1"
-    ) as cluster:
+    with local_cluster(2) as cluster:
         tasks = squares() + CHAIN + [Task("broken", fail, {"x": 3.0})]
         there = run_sweep(
             tasks, SweepStore(tmp_path / "cluster"), scheduler=cluster.scheduler_address
@@ -190,14 +188,6 @@ def test_a_local_cluster_of_two_workers_gives_the_same(tmp_path):
 
 @pytest.mark.filterwarnings("ignore")
 def test_a_cluster_that_does_not_answer_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr(distributed, "Client", _hurried(distributed.Client))
+    monkeypatch.setattr(distributed, "Client", hurried(distributed.Client))
     with pytest.raises(InputError, match="no Dask scheduler"):
         run_sweep(squares(), SweepStore(tmp_path), scheduler="tcp://127.0.0.1:9")
-
-
-def _hurried(client):
-    @wraps(client)
-    def connect(address, timeout, **options):
-        return client(address, timeout=1, **options)
-
-    return connect
