@@ -20,7 +20,7 @@ from ..equilibrium.newton import refine
 from ..errors import SimulationFailure
 from ..scene.limits import HingeLimits
 from ..structures.base import Design
-from ..structures.deviation import fit_summary
+from ..structures.deviation import OFF_TARGET, fit_summary
 from ..structures.fitting import FitResult, TargetFitting
 from ..structures.loads import LoadCase
 from ..structures.plausibility import design_doubts
@@ -235,6 +235,9 @@ def simulate(design: Design, loads: LoadCase | None = None, engine: str = FAST) 
         engine,
         checks,
     )
+    if fit.max_percent > OFF_TARGET:
+        for caution in design.cautions:
+            log.warning("%s: %s", design.name, caution)
     if result.displaced_percent > max(_FAR_AWAY, _SLID * fit.max_percent):
         log.warning(
             "%s: on the surface, but joints end up to %.3g %% of its size away from their "

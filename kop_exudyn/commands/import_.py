@@ -89,6 +89,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "deployment, in radians or as 35deg; positive: the narrow angles open",
     )
     shell.add_argument(
+        "--side",
+        choices=("up", "down"),
+        help="of a C-shell: to which side of the drawing's plane it rises (default: up)",
+    )
+    shell.add_argument(
         "--surface",
         type=Path,
         metavar="MESH",

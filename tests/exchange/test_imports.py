@@ -78,6 +78,22 @@ class TestUnits:
         assert status == 0 and "look at    the section of 0.6 x 0.004 m is thick" in told
 
 
+class TestSides:
+    def test_the_side_is_written_where_it_is_given(self, corpus, tmp_path, capsys):
+        for side, options in ((1, ()), (1, ("--side", "up")), (-1, ("--side", "down"))):
+            out = tmp_path / "_".join(("net", *options))
+            status, _, error = imported(
+                capsys, corpus / "lines.obj", "--out", f"{out}.json", *SHELL, *options
+            )
+            assert status == 0, error
+            assert load_design(f"{out}.json").side == side
+
+    def test_a_grid_has_none(self, corpus, tmp_path, capsys):
+        options = ("--as", "grid", "--side", "down", "--out", tmp_path / "net.json")
+        status, _, error = imported(capsys, corpus / "lines.obj", *options)
+        assert status == 2 and "--side" in error
+
+
 class TestTargets:
     def test_the_scale_is_the_targets_too(self, corpus, tmp_path, capsys):
         """A net and its target in millimetres, the design in metres."""

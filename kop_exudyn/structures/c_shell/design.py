@@ -45,6 +45,8 @@ from ..base import (
     register_class,
     register_rescaling,
 )
+from ..deviation import OFF_TARGET
+from ..fitting import TargetFitting
 from ..mesh_target import check_target_size, load_target_mesh, target_on_mesh
 from ..numbering import rescaled_values
 from ..opening import Station, Way
@@ -62,6 +64,7 @@ _REFINEMENTS = 3  # of the target's triangles
 _INWARD, _SLIVER = 1e-6, 1e-9  # of the way to the middle
 _STRETCH = 1e-7  # tells equally good triangulations apart
 _ARM = 0.37  # of the longest: one that gives a net its direction
+_NEARER = 0.6  # times as far off: what makes the other side the better one
 _ODD_ANGLE = np.radians(150)  # with it no model is near to being undecided
 
 
@@ -242,6 +245,29 @@ class CShell(Design):
 
     def file_with(self, data: Mapping[str, Any], q: np.ndarray) -> dict[str, Any]:
         return {**data, "straightened": self.layout.numbering.split(q)}
+
+    @property
+    def cautions(self) -> list[str]:
+        """That a mesh suits the shape better which the design has when it rises to the other side:
+        without weight, a plane net's two shapes are mirror images of each other."""
+        if self.target_mesh is None:
+            return []
+        try:
+            joints = self.smooth_path[-1].state.positions[self.joints]
+        except SimulationFailure:  # which says more than this
+            return []
+        own, other = (
+            TargetFitting(target_on_mesh(self.target_mesh, x)).minimum_zone(x).max_percent
+            for x in (joints, joints * (1.0, 1.0, -1.0))
+        )
+        if own <= OFF_TARGET or other > _NEARER * own:
+            return []
+        now, better = ("up", "down") if self.side > 0 else ("down", "up")
+        return [
+            f"it rises {now}, and is {own:.2g} % off the target mesh before anything is "
+            f"straightened; rising {better} it would be {other:.2g} %: opening.side "
+            f'"{better}" in its file (kop import --side {better}) makes it rise there'
+        ]
 
     @property
     def _rest_opening(self) -> float:

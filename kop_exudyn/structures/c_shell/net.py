@@ -10,11 +10,14 @@ from ..nets import NetClass, register_net
 
 def _content(curves: Sequence[Mapping[str, Any]], options: Mapping[str, Any]) -> dict[str, Any]:
     """All curves are hinged wherever they cross."""
+    opening = {"angle": options["opening"]}
+    if options["side"] is not None:
+        opening["side"] = options["side"]
     own = {
         "curves": list(curves),
         "crossings": "find",
         "free_ends": options["free_ends"],
-        "opening": {"angle": options["opening"]},
+        "opening": opening,
     }
     return own if options["target"] is None else own | {"target": options["target"]}
 
@@ -25,7 +28,7 @@ register_net(
         "a C-shell",
         "C-shells",
         _content,
-        options=("opening", "target", "free_ends"),
+        options=("opening", "side", "target", "free_ends"),
         needed=("opening",),
     ),
 )
