@@ -31,7 +31,7 @@ from .reuse import counts_of, fabricated, kit_size_percent
 log = logging.getLogger(__name__)
 
 _SHARE = 0.25  # of a kind's parts, by which kits grow, and shrink at first
-_FAR = 1.3  # times the deviation allowed, above which kits double
+_FAR = 1.3  # times the deviation allowed, above which kits double, and no other start may help
 _EXCESS = 1e-3  # of the elastic limit: what the search's tolerances leave
 _MOST = 60  # parts of a kind; designs that need more share nothing worth the name
 
@@ -170,8 +170,10 @@ def smallest_kit(
     examine : looks at the input designs before the first kit is sought, see `optimize_kit`
 
     From a kit that is good enough, parts of the dearest kind are merged away, a quarter of them at
-    first, then fewer, until no kind can do with one part less. A kit that isn't good enough grows
-    by a quarter of every kind until it is; one that is far from it doubles.
+    first, then fewer, until no kind can do with one part less. Where one part less ends just above
+    the deviation, it is sought once more from scratch, as what a kit ends at depends on where it
+    began. A kit that isn't good enough grows by a quarter of every kind until it is; one that is
+    far from it doubles.
 
     Returns the kit, None where none was found up to 60 parts of a kind, and all kits in the order
     in which they were looked at.
@@ -181,6 +183,9 @@ def smallest_kit(
     chain = _Chain(designs, settings, store, observer, announce, examine)
 
     required = settings.stages.requirements
+
+    def near(kit: SizedKit) -> bool:
+        return limit < kit.max_percent <= _FAR * limit
 
     def good(kit: SizedKit) -> bool:
         return kit.max_percent <= limit and not unmet(kit.result, required) and accepts(kit.result)
@@ -205,6 +210,8 @@ def smallest_kit(
             return now, chain.kits
         kind = max(steps, key=lambda k: (steps[k], now.sizes[k]))
         trial = chain.kit({**now.sizes, kind: now.sizes[kind] - steps[kind]}, now)
+        if near(trial) and steps[kind] == 1:
+            trial = chain.kit(trial.sizes)
         if good(trial) and cost.of(trial.result) <= cost.of(now.result):
             now = trial
         else:

@@ -85,6 +85,20 @@ def test_the_smallest_kit_that_will_do(designs, middle):
     assert wide.sizes == {"linear": 1, "angular": 1}
 
 
+def test_a_kit_that_just_misses_is_sought_from_scratch_as_well(designs):
+    """What a smaller kit ends at depends on the one it is merged from."""
+    first = {"linear": 3, "angular": 2}
+    far, tried = smallest_kit(designs, 1e3, first, settings=SETTINGS)
+    assert far is not None and [kit.origin for kit in tried].count("scratch") == 1
+    merged = next(kit for kit in tried if kit.origin != "scratch")
+    limit = merged.max_percent / 1.1
+    found, tried = smallest_kit(designs, limit, first, settings=SETTINGS)
+    misses = [kit for kit in tried[1:] if limit < kit.max_percent <= 1.3 * limit]
+    again = [kit for kit in tried[1:] if kit.origin == "scratch"]
+    assert misses and again and again[0].sizes == misses[0].sizes
+    assert found is None or found.max_percent <= limit
+
+
 def test_requirements_that_are_missed_are_told(middle):
     none = Requirements.none()
     assert unmet(middle, none) == []
