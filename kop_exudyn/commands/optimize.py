@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..wording import counted_parts
-from .options import add_cost, add_designs, add_processes, add_results, add_selection
+from .options import add_cost, add_designs, add_effort, add_processes, add_results, add_selection
 from .output import add_json, report, shows_progress
 from .values import (
     not_negative,
@@ -105,20 +105,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="accepted steps at most, in each round of either stage",
     )
-    parser.add_argument(
-        "--leaps",
-        type=not_negative,
-        metavar="N",
-        help="how often many elements get other parts at once, to leave a local minimum: more find "
-        "better kits and take longer (default: 3)",
-    )
-    parser.add_argument(
-        "--effort",
-        choices=("quick", "normal", "thorough"),
-        help="from how many starts the parts are optimised (default: normal, the best two of a "
-        "dozen; quick: that of the relaxed stage alone; thorough: the best eight of many, then "
-        "exchanges)",
-    )
+    add_effort(parser)
     parser.add_argument(
         "--reuse",
         type=not_negative_number,

@@ -33,6 +33,24 @@ def add_cost(parser: argparse.ArgumentParser, help: str) -> None:
     parser.add_argument("--cost", type=kit_cost, metavar="part=W,...", help=help)
 
 
+def add_effort(parser: argparse.ArgumentParser) -> None:
+    """Add --effort and --leaps."""
+    parser.add_argument(
+        "--leaps",
+        type=not_negative,
+        metavar="N",
+        help="how often many elements get other parts at once, to leave a local minimum: more find "
+        "better kits and take longer (default: 3)",
+    )
+    parser.add_argument(
+        "--effort",
+        choices=("quick", "normal", "thorough"),
+        help="from how many starts the parts are optimised (default: normal, the best two of a "
+        "dozen; quick: that of the relaxed stage alone; thorough: the best eight of many, then "
+        "exchanges)",
+    )
+
+
 def add_results(parser: argparse.ArgumentParser) -> None:
     """Add --out, and how a search treats what is there already."""
     parser.add_argument(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from .options import add_cost, add_designs, add_processes, add_results, add_selection
+from .options import add_cost, add_designs, add_effort, add_processes, add_results, add_selection
 from .output import add_json, report, shows_progress
 from .values import part_ranges
 
@@ -33,6 +33,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     add_selection(parser)
     add_results(parser)
     add_cost(parser, "of a part, a piece, a cut; shown with every kit (default: part=1)")
+    add_effort(parser)
     add_processes(parser)
     add_json(parser)
 
@@ -59,8 +60,9 @@ def run(args: argparse.Namespace) -> int:
         {kind: counts[min(k, len(counts) - 1)] for kind, counts in ranges.items()}
         for k in range(steps)
     ]
-    stages = study.settings if args.seed is None else replace(study.settings, seed=args.seed)
-    study = replace(study, settings=stages, baselines=False)
+    asked = {name: getattr(args, name) for name in ("effort", "leaps", "seed")}
+    given = {name: value for name, value in asked.items() if value is not None}
+    study = replace(study, settings=replace(study.settings, **given), baselines=False)
     designs = study.designs()
     cost = KitCost(**args.cost) if args.cost else KitCost()
     kits = tradeoff_and_report(

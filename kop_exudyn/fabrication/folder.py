@@ -9,6 +9,8 @@ from pathlib import Path
 from ..errors import InputError
 from ..files.files import file_stem, make_folder, write_text
 from ..files.tables import write_csv
+from ..io.stocks import stock_rows
+from ..units import Units
 from .assembly import joint_places, joint_table, write_assembly_plan
 from .assembly_layout import assembly_drawing
 from .assembly_order import assembly_steps, fasteners
@@ -42,8 +44,8 @@ def export_workshop(
 ) -> list[Path]:
     """Write all that a workshop needs; returns the files' paths.
 
-    Tables (CSV): cut_list, material, fasteners, bars; of every design its bill, assembly plan,
-    steps and joints. Drawings: workshop.pdf to print, the assembly of every design (SVG), cut
+    Tables (CSV): cut_list, material, fasteners, bars, stock; of every design its bill, assembly
+    plan, steps and joints. Drawings: workshop.pdf to print, the assembly of every design (SVG), cut
     sheets and templates at true scale. READ_ME.txt says what each of these files is, and what the
     tables' columns mean.
 
@@ -72,7 +74,9 @@ def export_workshop(
     )
     folder = make_folder(folder)
     done = [write_cut_list(folder / "cut_list.csv", blanks, tolerances, overwrite=overwrite)]
+    units = parts.designs[0].design.units or Units(unit)
     tables = {
+        "stock": stock_rows(parts.kit, parts.needed(), units),
         "material": material(blanks, sheets, bars),
         "fasteners": fasteners(blanks),
         "bars": bar_rows(bars),

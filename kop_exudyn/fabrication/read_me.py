@@ -20,6 +20,8 @@ _FILES = {
     r"cut_list$": "one line a part: how many to make, and how to cut it",
     r"material$": "what the parts take, and the bars and sheets to buy for them",
     r"fasteners$": "bolts or pins, as many as the design with most of them needs",
+    r"stock$": "these pieces as a stock, from which other designs can be sought: kop optimize "
+    "DESIGNS --stock stock.csv. Change the counts to what is there",
     r"bars$": "which piece is sawn from which bar, in order",
     r"bill_": "how many pieces of each part the design of that name needs",
     r"steps_": "in which order that design is put together",
@@ -34,6 +36,12 @@ _COLUMNS = {
     r"part": "label of a part; pieces of one part are alike",
     r"kind": "linear: a straight piece; angular: a corner; cell: two plates and their arms; slit: "
     "a straight piece with slits for its bolts",
+    r"count": "of a stock: how many pieces of the part there are",
+    r"unit": "of the lengths beside it, which are not rounded; angles are in radians",
+    r"force_unit": "the unit of force of the designs",
+    r"l1|l2|top|bottom|angle": "of a stock: the part itself, see the columns of that name with a "
+    "unit in the cut list",
+    r"slit": "of a stock: by how much shorter either side may be bolted",
     r"pieces": "how many to make or to buy: enough for any one of the designs",
     r"in_.*": "how many of them the design of that name needs",
     r"angle_deg": "of a corner: by how much the second strip turns against the first; of a joint: "

@@ -6,7 +6,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +19,15 @@ from ..files.json_files import read_json
 from ..kit.kinds import kind_names, part_kind
 from ..kit.parts import Kit
 from ..kit.stock import Stock
-from ..units import units_from_dict
+from ..units import Units, units_from_dict
 from .kits import check_lengths
 
 STOCK_VERSION = 1
 _OWN_COLUMNS = ("kind", "count")
+_UNITS = {
+    "unit": "length",
+    "force_unit": "force",
+}  # columns that there may be, by the units' fields
 
 
 def load_stock(path: str | Path, *, together: bool = False) -> Stock:
@@ -38,7 +42,7 @@ def load_stock(path: str | Path, *, together: bool = False) -> Stock:
     """
     path = Path(path)
     if path.suffix.lower() == ".csv":
-        rows, units = _csv_rows(path), None
+        rows, units = _csv_rows(path)
     else:
         data = read_json(path)
         check_envelope(data, "stock", STOCK_VERSION, source=path)
@@ -61,6 +65,26 @@ def load_stock(path: str | Path, *, together: bool = False) -> Stock:
         return Stock(kit, pieces, together)
     except InputError as error:
         raise error.at(str(path)) from None
+
+
+def stock_rows(
+    kit: Kit, counts: Mapping[str, Sequence[int]], units: Units
+) -> list[dict[str, str | int | float | None]]:
+    """A stock's table as `load_stock` reads it: one row a part.
+
+    kit : its parts; counts : kind -> (m,) how many pieces there are of each
+    units : of the kit's numbers
+    """
+    names = dict.fromkeys(name for kind in kit.parts for name in part_kind(kind).parameter_names)
+    rows: list[dict[str, str | int | float | None]] = []
+    for kind, parts in kit.parts.items():
+        for values, count in zip(parts, counts[kind]):
+            own = dict(zip(part_kind(kind).parameter_names, values.tolist()))
+            row = {"kind": kind, "count": int(count), "unit": units.length}
+            if units.force != "N":
+                row["force_unit"] = units.force
+            rows.append(row | {name: own.get(name) for name in names})
+    return rows
 
 
 def _piece(row: Mapping[str, Any], field: str, path: Path) -> tuple[str, tuple[float, ...], int]:
@@ -98,8 +122,8 @@ def _piece(row: Mapping[str, Any], field: str, path: Path) -> tuple[str, tuple[f
     return kind, tuple(canonical.tolist()), row["count"]
 
 
-def _csv_rows(path: Path) -> list[tuple[str, dict[str, Any]]]:
-    """Rows as JSON has them, each with what to call it in an error."""
+def _csv_rows(path: Path) -> tuple[list[tuple[str, dict[str, Any]]], Units | None]:
+    """Rows as JSON has them, each with what to call it in an error; and their units."""
     try:
         text = read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -115,7 +139,28 @@ def _csv_rows(path: Path) -> list[tuple[str, dict[str, Any]]]:
         lines = [(table.line_num, row) for row in table]
     except csv.Error as error:
         raise InputError(f"not CSV: {error}", source=path) from None
-    return [_csv_row(line, row, path) for line, row in lines]
+    return [_csv_row(line, row, path) for line, row in lines], _csv_units(lines, path)
+
+
+def _csv_units(lines: Sequence[tuple[int, Mapping[str, Any]]], path: Path) -> Units | None:
+    """The units that a table's columns name; None where they name none."""
+    found = {}
+    for column, field in _UNITS.items():
+        for line, row in lines:
+            name = (row.get(column) or "").strip()
+            if name and found.setdefault(field, name) != name:
+                raise InputError(
+                    f"expected one unit in all rows ({found[field]} before)",
+                    source=path,
+                    field=f"line {line}, {column}",
+                    value=name,
+                )
+    if "length" not in found:
+        return None
+    try:
+        return Units(**found)
+    except InputError as error:
+        raise error.at(str(path)) from None
 
 
 def _csv_row(line: int, row: Mapping[str, Any], path: Path) -> tuple[str, dict[str, Any]]:
@@ -126,7 +171,7 @@ def _csv_row(line: int, row: Mapping[str, Any], path: Path) -> tuple[str, dict[s
     parameters = {
         name: _number(text, path, f"{field}, {name}")
         for name, text in cells.items()
-        if name not in _OWN_COLUMNS and text
+        if name not in (*_OWN_COLUMNS, *_UNITS) and text
     }
     count = _number(cells["count"], path, f"{field}, count")
     if not 0 <= count <= LARGEST_WHOLE or count != int(count):

@@ -343,7 +343,7 @@ def _check_kinds(designs: Sequence[Design], kit: Kit) -> None:
 
 def _lacks(missing: Sequence[Missing], designs: Sequence[Design], stock: Stock) -> str:
     """What a stock lacks, in words: how many pieces of which kind, and of which parts best."""
-    found = []
+    found, common = [], common_units({design.name: design.units for design in designs})
     for one in missing:
         whose = "all designs together" if one.design is None else designs[one.design].name
         missed = counted(one.number, f"{one.kind} piece is", f"{one.kind} pieces are")
@@ -351,7 +351,7 @@ def _lacks(missing: Sequence[Missing], designs: Sequence[Design], stock: Stock) 
         if one.copies is not None:
             parts = stock.kit[one.kind]
             quantity = "angle" if part_kind(one.kind).angular else "length"
-            unit = unit_of(quantity, stock.kit.units)
+            unit = unit_of(quantity, stock.kit.units or common)
             best = ", ".join(
                 f"{count} of ({', '.join(f'{value:.6g}' for value in parts[k])}) {unit}"
                 for k, count in enumerate(one.copies)

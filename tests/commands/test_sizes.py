@@ -6,6 +6,7 @@ from support.commands import status_of
 from kop_exudyn.commands.values import kit_cost, part_ranges
 from kop_exudyn.io.kits import save_kit
 from kop_exudyn.kit.parts import Kit
+from kop_exudyn.report import sizes_run
 
 
 def test_ranges():
@@ -32,3 +33,20 @@ def test_what_makes_no_sense(command, message, design_file, tmp_path, capsys):
     arguments = (name, design_file.parent, "--out", tmp_path / "out", *options)
     assert status_of(*arguments) == 2
     assert message in capsys.readouterr().err and not (tmp_path / "out").exists()
+
+
+def test_the_effort_of_a_trade_off_is_the_searches(design_file, tmp_path, monkeypatch):
+    asked = []
+
+    def searched(designs, sizes, *, settings, **others):
+        asked.append(settings.stages)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sizes_run, "tradeoff_and_report", searched)
+    options = ("--parts", "linear=2:3,angular=2", "--out", tmp_path / "out")
+    given = ("--effort", "quick", "--leaps", "1", "--seed", "7")
+    for more in ((), given):
+        assert status_of("tradeoff", design_file.parent, *options, *more) == 130
+    plain, quick = asked
+    assert (plain.effort, plain.seed) == ("normal", 0)
+    assert (quick.effort, quick.leaps, quick.seed) == ("quick", 1, 7)

@@ -15,6 +15,7 @@ from kop_exudyn.fabrication.options import CutOptions
 from kop_exudyn.fabrication.pieces import parts_list
 from kop_exudyn.fabrication.read_me import _COLUMNS, _FILES, explained
 from kop_exudyn.fabrication.stock import stock_plan
+from kop_exudyn.io.stocks import load_stock
 from kop_exudyn.kit.cluster import cluster
 from kop_exudyn.structures.serving import served_by
 
@@ -89,6 +90,14 @@ def test_nothing_is_to_choose_where_strips_fit_the_bars_alone(parts, tmp_path):
     assert "to buy: bars of 2400 mm" in items
     assert "to buy: sheets of 300 x 300 mm, as drawn" in items
     assert "choose one" not in (tmp_path / "READ_ME.txt").read_text(encoding="utf-8")
+
+
+def test_its_pieces_are_a_stock_for_other_designs(parts, folder):
+    stock = load_stock(folder / "stock.csv")
+    needed = parts.needed()
+    assert stock.to_dict() == {kind: counts.tolist() for kind, counts in needed.items()}
+    for kind, values in parts.kit.parts.items():
+        np.testing.assert_array_equal(stock.kit[kind], values)
 
 
 def test_every_file_and_column_is_explained_beside_them(folder):

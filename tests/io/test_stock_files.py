@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from kop_exudyn.errors import InputError
-from kop_exudyn.io.stocks import load_stock
+from kop_exudyn.files.tables import write_csv
+from kop_exudyn.io.stocks import load_stock, stock_rows
+from kop_exudyn.kit.parts import Kit
 from kop_exudyn.units import Units
 
 
@@ -42,11 +44,27 @@ def test_json_by_order_and_by_name(tmp_path):
     assert stock.to_dict() == {"linear": [4, 0]} and stock.kit.units == Units("mm")
 
 
+@pytest.mark.parametrize("units", [Units("mm"), Units("m", "kN")])
+def test_a_kits_pieces_are_read_as_they_were_written(units, tmp_path):
+    parts = {"angular": np.array([[0.1], [1 / 3]]), "linear": np.array([[1 / 7, 2.0]])}
+    rows = stock_rows(Kit(parts, units), {"angular": [3, 0], "linear": [5]}, units)
+    stock = load_stock(write_csv(tmp_path / "store.csv", rows))
+    assert stock.kit.units == units
+    assert stock.to_dict() == {"angular": [3, 0], "linear": [5]}
+    for kind, values in parts.items():
+        np.testing.assert_array_equal(stock.kit[kind], values)
+
+
 @pytest.mark.parametrize(
     "text, message",
     [
         ("kind,l1,l2\nlinear,1,2\n", "count: a column is missing"),
         ("kind,count\n", "no pieces"),
+        (
+            "kind,count,unit,l1,l2\nlinear,1,mm,1,2\nlinear,1,m,1,2\n",
+            r"line 3, unit = 'm': expected one unit in all rows \(mm before\)",
+        ),
+        ("kind,count,unit,l1,l2\nlinear,1,mn,1,2\n", "unknown unit"),
         ("", "kind: a column is missing"),
         ("kind,count,l1,l2\nround,1,1,2\n", r"line 2.kind = 'round': unknown kind"),
         ("kind,count,l1\nlinear,1,1\n", r"line 2 = 'l1': linear parts have the parameters l1, l2"),
