@@ -68,19 +68,19 @@ def load_stock(path: str | Path, *, together: bool = False) -> Stock:
 
 
 def stock_rows(
-    kit: Kit, counts: Mapping[str, Sequence[int]], units: Units
-) -> list[dict[str, str | int | float | None]]:
+    kit: Kit, counts: Mapping[str, Sequence[int] | np.ndarray], units: Units
+) -> list[dict[str, Any]]:
     """A stock's table as `load_stock` reads it: one row a part.
 
     kit : its parts; counts : kind -> (m,) how many pieces there are of each
     units : of the kit's numbers
     """
     names = dict.fromkeys(name for kind in kit.parts for name in part_kind(kind).parameter_names)
-    rows: list[dict[str, str | int | float | None]] = []
+    rows: list[dict[str, Any]] = []
     for kind, parts in kit.parts.items():
         for values, count in zip(parts, counts[kind]):
             own = dict(zip(part_kind(kind).parameter_names, values.tolist()))
-            row = {"kind": kind, "count": int(count), "unit": units.length}
+            row: dict[str, Any] = {"kind": kind, "count": int(count), "unit": units.length}
             if units.force != "N":
                 row["force_unit"] = units.force
             rows.append(row | {name: own.get(name) for name in names})
@@ -144,7 +144,7 @@ def _csv_rows(path: Path) -> tuple[list[tuple[str, dict[str, Any]]], Units | Non
 
 def _csv_units(lines: Sequence[tuple[int, Mapping[str, Any]]], path: Path) -> Units | None:
     """The units that a table's columns name; None where they name none."""
-    found = {}
+    found: dict[str, str] = {}
     for column, field in _UNITS.items():
         for line, row in lines:
             name = (row.get(column) or "").strip()
