@@ -32,6 +32,7 @@ log = logging.getLogger(__name__)
 
 _SHARE = 0.25  # of a kind's parts, by which kits grow, and shrink at first
 _FAR = 1.3  # times the deviation allowed, above which kits double, and no other start may help
+_SCRATCH = "scratch"
 _EXCESS = 1e-3  # of the elastic limit: what the search's tolerances leave
 _MOST = 60  # parts of a kind; designs that need more share nothing worth the name
 
@@ -184,8 +185,9 @@ def smallest_kit(
 
     required = settings.stages.requirements
 
-    def near(kit: SizedKit) -> bool:
-        return limit < kit.max_percent <= _FAR * limit
+    def other_start(kit: SizedKit) -> bool:
+        known = any(k.sizes == kit.sizes and k.origin == _SCRATCH for k in chain.kits)
+        return limit < kit.max_percent <= _FAR * limit and not known
 
     def good(kit: SizedKit) -> bool:
         return kit.max_percent <= limit and not unmet(kit.result, required) and accepts(kit.result)
@@ -210,7 +212,7 @@ def smallest_kit(
             return now, chain.kits
         kind = max(steps, key=lambda k: (steps[k], now.sizes[k]))
         trial = chain.kit({**now.sizes, kind: now.sizes[kind] - steps[kind]}, now)
-        if near(trial) and steps[kind] == 1:
+        if steps[kind] == 1 and other_start(trial):
             trial = chain.kit(trial.sizes)
         if good(trial) and cost.of(trial.result) <= cost.of(now.result):
             now = trial
@@ -287,7 +289,7 @@ class _Chain:
             announce=lambda phase: self.announce(f"{shown}: {phase}"),
             examine=(lambda pool: None) if self.kits else self.examine,
         )
-        origin = "scratch"
+        origin = _SCRATCH
         if before is not None and start is not None:
             # what the whole chain began with: it is what this kit is compared with
             earlier = {s: start.result.stages[s] for s in ("direct", "relaxed")}

@@ -8,7 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..wording import counted_parts
-from .options import add_cost, add_designs, add_effort, add_processes, add_results, add_selection
+from .options import (
+    add_cost,
+    add_designs,
+    add_effort,
+    add_processes,
+    add_results,
+    add_selection,
+    given,
+)
 from .output import add_json, report, shows_progress
 from .values import (
     not_negative,
@@ -334,17 +342,10 @@ def _smallest(args: argparse.Namespace, study: Study, parts: dict[str, int]) -> 
 
 def _given(args: argparse.Namespace) -> dict[str, Any]:
     """The stages' settings that options give."""
-    steps = dict.fromkeys(("relaxed_steps", "assigned_steps", "round_steps"), args.max_steps)
-    given = {
-        "effort": args.effort,
-        "seed": args.seed,
-        "leaps": args.leaps,
-        "reuse": args.reuse,
-        "slit_cost": args.slit_cost,
-        "redeployments": args.redeployments,
-        **steps,
-    }
-    return {name: value for name, value in given.items() if value is not None}
+    own = given(args, "effort", "seed", "leaps", "reuse", "slit_cost", "redeployments")
+    if args.max_steps is not None:
+        own |= dict.fromkeys(("relaxed_steps", "assigned_steps", "round_steps"), args.max_steps)
+    return own
 
 
 def _required(args: argparse.Namespace, known: Requirements) -> Requirements:

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from .values import design_selection, kit_cost, not_negative, positive
+
+
+def given(args: argparse.Namespace, *names: str) -> dict[str, Any]:
+    """Those of these options that were given, by name: others stay as a study has them."""
+    return {name: value for name in names if (value := getattr(args, name)) is not None}
 
 
 def add_designs(parser: argparse.ArgumentParser) -> None:

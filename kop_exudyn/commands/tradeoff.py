@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import argparse
 
-from .options import add_cost, add_designs, add_effort, add_processes, add_results, add_selection
+from .options import (
+    add_cost,
+    add_designs,
+    add_effort,
+    add_processes,
+    add_results,
+    add_selection,
+    given,
+)
 from .output import add_json, report, shows_progress
 from .values import part_ranges
 
@@ -60,9 +68,8 @@ def run(args: argparse.Namespace) -> int:
         {kind: counts[min(k, len(counts) - 1)] for kind, counts in ranges.items()}
         for k in range(steps)
     ]
-    asked = {name: getattr(args, name) for name in ("effort", "leaps", "seed")}
-    given = {name: value for name, value in asked.items() if value is not None}
-    study = replace(study, settings=replace(study.settings, **given), baselines=False)
+    stages = replace(study.settings, **given(args, "effort", "leaps", "seed"))
+    study = replace(study, settings=stages, baselines=False)
     designs = study.designs()
     cost = KitCost(**args.cost) if args.cost else KitCost()
     kits = tradeoff_and_report(

@@ -24,10 +24,8 @@ from .kits import check_lengths
 
 STOCK_VERSION = 1
 _OWN_COLUMNS = ("kind", "count")
-_UNITS = {
-    "unit": "length",
-    "force_unit": "force",
-}  # columns that there may be, by the units' fields
+# Columns that there may be besides, and what they are the units of.
+_UNITS = {"unit": "length", "force_unit": "force"}
 
 
 def load_stock(path: str | Path, *, together: bool = False) -> Stock:

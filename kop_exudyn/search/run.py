@@ -27,7 +27,7 @@ from ..structures.stacking import (
     stacked_groups,
     stacked_parameters,
 )
-from ..units import common_units, unit_of, unnamed_units
+from ..units import Units, common_units, unit_of, unnamed_units
 from ..wording import counted
 from . import demands
 from .checkpoints import NoStore, Store
@@ -275,7 +275,7 @@ def check_request(
     units = common_units({design.name: design.units for design in designs})
     if kit is not None:
         given = kit.kit.units if isinstance(kit, Stock) else kit.units
-        common_units({"the kit": given, "the designs": units}, "designs and kits")
+        units = common_units({"the kit": given, "the designs": units}, "designs and kits")
     constraints, n_q = settings.stages.constraints, parameter_offsets(designs)[-1]
     if constraints is not None and constraints.A.shape[1] != n_q:
         raise InputError(
@@ -289,7 +289,7 @@ def check_request(
     if isinstance(kit, Stock):
         missing = kit.missing(groups, q, group_designs(designs))
         if missing:
-            raise InputError(_lacks(missing, designs, kit), field="stock")
+            raise InputError(_lacks(missing, designs, kit, units), field="stock")
         return
     cluster(groups, q, dict(parts or {}), bounds=settings.stages.bounds, restarts=1)
 
@@ -341,9 +341,11 @@ def _check_kinds(designs: Sequence[Design], kit: Kit) -> None:
                 )
 
 
-def _lacks(missing: Sequence[Missing], designs: Sequence[Design], stock: Stock) -> str:
+def _lacks(
+    missing: Sequence[Missing], designs: Sequence[Design], stock: Stock, units: Units | None
+) -> str:
     """What a stock lacks, in words: how many pieces of which kind, and of which parts best."""
-    found, common = [], common_units({design.name: design.units for design in designs})
+    found = []
     for one in missing:
         whose = "all designs together" if one.design is None else designs[one.design].name
         missed = counted(one.number, f"{one.kind} piece is", f"{one.kind} pieces are")
@@ -351,7 +353,7 @@ def _lacks(missing: Sequence[Missing], designs: Sequence[Design], stock: Stock) 
         if one.copies is not None:
             parts = stock.kit[one.kind]
             quantity = "angle" if part_kind(one.kind).angular else "length"
-            unit = unit_of(quantity, stock.kit.units or common)
+            unit = unit_of(quantity, units)
             best = ", ".join(
                 f"{count} of ({', '.join(f'{value:.6g}' for value in parts[k])}) {unit}"
                 for k, count in enumerate(one.copies)

@@ -73,7 +73,7 @@ def test_the_steps_of_opening_do_not_choose_the_shape(files, number, monkeypatch
     """Two modes out of the plane that lie together would give different shapes for other steps."""
     shapes = []
     for step in (0.1, 0.05):
-        monkeypatch.setattr("kop_exudyn.structures.c_shell.design._OPENING_STEP", step)
+        monkeypatch.setattr("kop_exudyn.structures.c_shell.opening._OPENING_STEP", step)
         design = load_design(files[number])
         final = design.smooth_path[-1]
         shapes.append(pdist(final.state.positions[design.joints]))

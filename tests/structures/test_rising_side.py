@@ -35,7 +35,7 @@ def shells(tmp_path_factory):
 @pytest.mark.parametrize("side, mesh", [(None, "down"), ("up", "down"), ("down", "up")])
 def test_the_other_side_is_proposed_and_fits(side, mesh, shells):
     (told,) = shells(side, mesh).cautions
-    assert f'opening.side "{mesh}"' in told
+    assert f'opening.side "{mesh}"' in told and f"rising {mesh} it would be right on it" in told
     assert shells(mesh, mesh).cautions == []
 
 

@@ -23,7 +23,6 @@ from typing import Any
 import numpy as np
 
 from ...equilibrium.equilibria import Equilibrium, Start
-from ...equilibrium.newton import NewtonOptions
 from ...equilibrium.newton import solve as fast
 from ...equilibrium.system import System
 from ...errors import InputError, SimulationFailure
@@ -50,22 +49,20 @@ from ..fitting import TargetFitting
 from ..mesh_target import check_target_size, load_target_mesh, target_on_mesh
 from ..numbering import rescaled_values
 from ..opening import Station, Way
-from .opening import check_hinges, check_opening
+from .opening import check_hinges, check_opening, open_up
+from .own_axes import untied
 from .scene import RodModel, lay_out, shell_scene
 
 log = logging.getLogger(__name__)
 
 _STATION_STEP = 0.2  # rad of mean joint angle between the stations on the way
 _FLAT = 1e-4  # of the size: less height is none
-_OPENING_STEP = 0.1  # rad of mean joint angle a step
 _LARGEST_CORNER = 2.5  # rad
 _IMPERFECTION = 1e-3  # of the size, height of the shallow surface that imperfect rest shapes follow
 _REFINEMENTS = 3  # of the target's triangles
 _INWARD, _SLIVER = 1e-6, 1e-9  # of the way to the middle
-_STRETCH = 1e-7  # tells equally good triangulations apart
-_ARM = 0.37  # of the longest: one that gives a net its direction
+_TOLD = 0.01  # %: less is no deviation that anyone would build
 _NEARER = 0.6  # times as far off: what makes the other side the better one
-_ODD_ANGLE = np.radians(150)  # with it no model is near to being undecided
 
 
 class CShell(Design):
@@ -256,16 +253,21 @@ class CShell(Design):
             joints = self.smooth_path[-1].state.positions[self.joints]
         except SimulationFailure:  # which says more than this
             return []
+        mirrored = joints * (1.0, 1.0, -1.0)
         own, other = (
-            TargetFitting(target_on_mesh(self.target_mesh, x)).minimum_zone(x).max_percent
-            for x in (joints, joints * (1.0, 1.0, -1.0))
+            TargetFitting(target).minimum_zone(x).max_percent
+            for target, x in (
+                (self.target, joints),
+                (target_on_mesh(self.target_mesh, mirrored), mirrored),
+            )
         )
         if own <= OFF_TARGET or other > _NEARER * own:
             return []
         now, better = ("up", "down") if self.side > 0 else ("down", "up")
+        then = f"{other:.2g} %" if other >= _TOLD else "right on it"
         return [
             f"it rises {now}, and is {own:.2g} % off the target mesh before anything is "
-            f"straightened; rising {better} it would be {other:.2g} %: opening.side "
+            f"straightened; rising {better} it would be {then}: opening.side "
             f'"{better}" in its file (kop import --side {better}) makes it rise there'
         ]
 
@@ -299,8 +301,8 @@ class CShell(Design):
         for _ in range(_REFINEMENTS):
             vertices, faces = _split(vertices, faces)
         flat = self.layout.smooth[:, :2]
-        untied = _untied(flat)
-        flat, vertices = flat @ untied, vertices @ untied
+        stretch = untied(flat)
+        flat, vertices = flat @ stretch, vertices @ stretch
         lift = CloughTocher2DInterpolator(Delaunay(flat), state.positions, tol=1e-10)
         # straight outer curves have slivers of triangles, and points outside, made by rounding
         inward = flat.mean(axis=0) - vertices
@@ -312,71 +314,6 @@ class CShell(Design):
         used = np.unique(faces)
         faces = np.searchsorted(used, faces)
         return Target(lifted[used], faces, joints, size_of_points(lifted[used]))
-
-
-def open_up(
-    system: System, flat: float, opening: float, side: int, solve: Solve = fast
-) -> list[Equilibrium]:
-    """Open a smooth design by its mean opening angle, through the bifurcation to the chosen side of
-    the plane.
-
-    flat : the mean angle of the flat network, the scene's initial state; solve : an engine's
-    """
-    scene = system.scene
-    steps = max(1, int(np.ceil(abs(opening) / _OPENING_STEP - 1e-9)))
-    heights = np.zeros(scene.n_dofs)
-    heights[: 6 * scene.n_bodies].reshape(-1, 6)[:, 2] = side * _bulge(scene.initial.positions)
-    options = NewtonOptions(side=heights[system.sparsity.free])
-    path = [solve(system, np.empty(0), None, flat, options)]
-    for step in range(1, steps + 1):
-        angle = flat + opening * step / steps
-        try:
-            path.append(solve(system, np.empty(0), path[-1], angle, options))
-        except SimulationFailure as failure:
-            raise failure.within(f"smooth design, mean opening angle {angle:.3f} rad") from None
-    return path
-
-
-def _bulge(x: np.ndarray) -> np.ndarray:
-    """A height field (n,) that no symmetric buckling mode, even or odd, is orthogonal to: for
-    choosing a side. It turns with the net, and is mirrored with it, so that a saddle, whose two
-    sides are alike, rises to the same one wherever it is drawn."""
-    y = (x[:, :2] - x[:, :2].mean(axis=0)) @ _own_axes(x[:, :2]).T
-    y = y / np.hypot(*y.T).max()
-    r = (y**2).sum(axis=1)
-    height = r + 0.7 * (y[:, 0] ** 2 - y[:, 1] ** 2) + r * (0.3 * y[:, 0] + 0.18 * y[:, 1])
-    return height - height.mean()
-
-
-def _own_axes(flat: np.ndarray) -> np.ndarray:
-    """Axes (2, 2) that turn with a net (n, 2) and are mirrored with it: by its first points that
-    are far from its middle, and from the line there, at an angle that is no symmetric net's."""
-    arms = flat - flat.mean(axis=0)
-    along = _first_arm(flat)
-    along = along / np.hypot(*along)
-    off = along[0] * arms[:, 1] - along[1] * arms[:, 0]
-    side = np.sign(off[np.argmax(np.abs(off) > _ARM * np.abs(off).max())])
-    across = side * np.array([-along[1], along[0]])
-    c, s = np.cos(_ODD_ANGLE), np.sin(_ODD_ANGLE)
-    return np.array([c * along + s * across, c * across - s * along])
-
-
-def _first_arm(flat: np.ndarray) -> np.ndarray:
-    """From the middle of a net (n, 2) to its first point that is far from there."""
-    arms = flat - flat.mean(axis=0)
-    lengths = np.hypot(*arms.T)
-    return arms[np.argmax(lengths > _ARM * lengths.max())]
-
-
-def _untied(flat: np.ndarray) -> np.ndarray:
-    """A map (2, 2) of the plane that is the identity to 1e-7, and takes points that lie on one
-    circle, as those of symmetric nets do, off it: so that they are triangulated in the same way
-    however a net (n, 2) is turned. Lines stay lines. It stretches along a direction that turns with
-    the net, at an odd angle to it."""
-    first = _first_arm(flat)
-    angle = np.arctan2(first[1], first[0]) + 0.7
-    along = np.array([np.cos(angle), np.sin(angle)])
-    return np.eye(2) + _STRETCH * np.outer(along, along)
 
 
 def _split(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

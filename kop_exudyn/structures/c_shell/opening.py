@@ -1,12 +1,21 @@
-"""How far a C-shell can open: between closed and closed again, and every hinge for itself."""
+"""How the smooth design of a C-shell opens, and how far it can: between closed and closed again,
+and every hinge for itself."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from ...equilibrium.equilibria import Equilibrium
+from ...equilibrium.newton import NewtonOptions
+from ...equilibrium.newton import solve as fast
+from ...equilibrium.system import System
 from ...errors import InputError, SimulationFailure
 from ...geometry.network import CurveNetwork
 from ...scene.state import State
+from ..base import Solve
+from .own_axes import own_axes
+
+_OPENING_STEP = 0.1  # rad of mean joint angle a step
 
 
 def check_opening(flat: float, opening: float) -> None:
@@ -46,3 +55,37 @@ def check_hinges(network: CurveNetwork, state: State) -> None:
         f"{np.degrees(turns[worst]):.4g} degrees, which takes the two through each other: this net "
         "does not open by turning its two families, or is opened too far"
     )
+
+
+def open_up(
+    system: System, flat: float, opening: float, side: int, solve: Solve = fast
+) -> list[Equilibrium]:
+    """Open a smooth design by its mean opening angle, through the bifurcation to the chosen side of
+    the plane.
+
+    flat : the mean angle of the flat network, the scene's initial state; solve : an engine's
+    """
+    scene = system.scene
+    steps = max(1, int(np.ceil(abs(opening) / _OPENING_STEP - 1e-9)))
+    heights = np.zeros(scene.n_dofs)
+    heights[: 6 * scene.n_bodies].reshape(-1, 6)[:, 2] = side * _bulge(scene.initial.positions)
+    options = NewtonOptions(side=heights[system.sparsity.free])
+    path = [solve(system, np.empty(0), None, flat, options)]
+    for step in range(1, steps + 1):
+        angle = flat + opening * step / steps
+        try:
+            path.append(solve(system, np.empty(0), path[-1], angle, options))
+        except SimulationFailure as failure:
+            raise failure.within(f"smooth design, mean opening angle {angle:.3f} rad") from None
+    return path
+
+
+def _bulge(x: np.ndarray) -> np.ndarray:
+    """A height field (n,) that no symmetric buckling mode, even or odd, is orthogonal to: for
+    choosing a side. It turns with the net, and is mirrored with it, so that a saddle, whose two
+    sides are alike, rises to the same one wherever it is drawn."""
+    y = (x[:, :2] - x[:, :2].mean(axis=0)) @ own_axes(x[:, :2]).T
+    y = y / np.hypot(*y.T).max()
+    r = (y**2).sum(axis=1)
+    height = r + 0.7 * (y[:, 0] ** 2 - y[:, 1] ** 2) + r * (0.3 * y[:, 0] + 0.18 * y[:, 1])
+    return height - height.mean()
