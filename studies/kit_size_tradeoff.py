@@ -5,10 +5,10 @@
 
 Kits of several sizes are found by what kop tradeoff calls, for conformals 1 to 5 (2 to 25 linear
 and 5 angular parts), six umbrella meshes (1 to 12 cells) and six grids (1 to 12 linear and 5
-angular parts). The largest kit is sought from scratch, in both stages; every other one by merging
-parts of the next larger one, in two rounds of exchanges and without leaps. A kit that is worse than
-a smaller one is sought again from that one. At some sizes the direct projection and the published
-method make what they can of as many parts.
+angular parts). Each is sought from scratch, in both stages, with two rounds of exchanges and
+without leaps; the next larger kit, with parts of it merged, is one of its starts. A kit that is
+worse than a smaller one is sought again from that one, with parts of it split. At some sizes the
+direct projection and the published method make what they can of as many parts.
 
 Deviations are distances of the joints from the target surfaces, in % of their sizes, the larger of
 the state that is shown and of the one that the design opens into from its assembly; every state is

@@ -1,7 +1,7 @@
 """How many parts are enough: kits of neighbouring sizes, and the smallest one within a deviation.
 
-Every kit but the first starts from one of another size, whose parts are split or merged
-(search/neighbours.py). A larger kit is never worse than the smaller one it is compared with: where
+A kit of another size, with its parts split or merged (search/neighbours.py), is where the search
+for the smallest kit goes on, and one start among others in a trade-off. A larger kit is never worse than the smaller one it is compared with: where
 its own search ends with a larger deviation, the smaller kit with parts of it doubled is kept.
 """
 
@@ -22,7 +22,7 @@ from ..search.pool import DesignPool
 from ..search.requirements import Requirements
 from ..search.result import KitResult
 from ..search.run import optimize_kit
-from ..search.settings import JobSettings
+from ..search.settings import EFFORTS, JobSettings
 from ..search.stage_results import StageResult
 from ..structures.base import Design
 from ..structures.strength import largest_utilisation, strength_summary
@@ -232,15 +232,17 @@ def trade_off(
 ) -> list[SizedKit]:
     """Kits of these sizes, the smallest first; no kit deviates more than a smaller one before it.
 
-    sizes : kind -> number of parts, from small to large; the largest is searched from scratch, the
-        others from the next larger one, and again from the next smaller one where they are worse
+    sizes : kind -> number of parts, from small to large. Each is searched from scratch, with the
+        next larger kit as one more start (with effort "quick" the largest only, and the others from
+        the next larger one alone), and again from the next smaller one where it is worse than that
     store, observer, announce, examine : see `smallest_kit`
     """
     wanted = [dict(size) for size in sizes]
     chain = _Chain(designs, settings, store, observer, announce, examine)
     kits: list[SizedKit] = []
+    anew = EFFORTS[settings.stages.effort].clusterings > 0
     for size in reversed(wanted):
-        kits.insert(0, chain.kit(size, kits[0] if kits else None))
+        kits.insert(0, chain.kit(size, kits[0] if kits else None, anew=anew))
     for n in range(1, len(kits)):
         smaller, larger = kits[n - 1], kits[n]
         if larger.max_percent <= smaller.max_percent or not _all_larger(larger, smaller):
@@ -270,9 +272,11 @@ class _Chain:
         self.store, self.observer, self.announce = store or NoStore(), observer, announce
         self.kits: list[SizedKit] = []
 
-    def kit(self, sizes: Mapping[str, int], start: SizedKit | None = None) -> SizedKit:
-        """A kit of these sizes, from another one or from scratch."""
-        shown = ", ".join(f"{count} {kind}" for kind, count in sizes.items())
+    def kit(
+        self, sizes: Mapping[str, int], start: SizedKit | None = None, anew: bool = False
+    ) -> SizedKit:
+        """A kit of these sizes, from another one, from scratch, or (`anew`) from both."""
+        shown = _listed(sizes)
         self.announce(shown)
         begin = perf_counter()
         before: StageResult | None = None
@@ -283,26 +287,33 @@ class _Chain:
         result = optimize_kit(
             self.designs,
             sizes,
-            start=before,
+            start=None if anew else before,
+            beside=before if anew else None,
             settings=self.settings,
             store=own,
             announce=lambda phase: self.announce(f"{shown}: {phase}"),
             examine=(lambda pool: None) if self.kits else self.examine,
         )
         origin = _SCRATCH
-        if before is not None and start is not None:
+        kept = next(one.origin for one in result.tried if one.kept)
+        if start is not None and before is not None and (not anew or kept == "neighbour"):
+            origin = _listed(start.sizes)
+        if start is not None and before is not None and not anew:
             # what the whole chain began with: it is what this kit is compared with
             earlier = {s: start.result.stages[s] for s in ("direct", "relaxed")}
             result.stages = {**earlier, **result.stages}
             result.clustering = start.result.clustering
             relaxed = [event for event in start.result.events if event.stage == "relaxed"]
             result.events = [*relaxed, *result.events]
-            origin = ", ".join(f"{count} {kind}" for kind, count in start.sizes.items())
         found = SizedKit(result, dict(sizes), origin, perf_counter() - begin)
         log.info("%s parts: largest deviation %.3g %%", shown, found.max_percent)
         self.kits.append(found)
         self.observer(found)
         return found
+
+
+def _listed(sizes: Mapping[str, int]) -> str:
+    return ", ".join(f"{count} {kind}" for kind, count in sizes.items())
 
 
 def _fabricated(result: KitResult) -> dict[str, int]:

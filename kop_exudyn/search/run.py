@@ -59,6 +59,7 @@ def optimize_kit(
     *,
     kit: Kit | Stock | None = None,
     start: Sequence[Sequence[float]] | StageResult | None = None,
+    beside: StageResult | None = None,
     settings: JobSettings = JobSettings(),
     store: Store | None = None,
     observer: Observer | None = None,
@@ -78,6 +79,8 @@ def optimize_kit(
         projection, the baseline and the relaxed stage: the elements are clustered anew, and the
         assigned stage begins there. Or the assigned stage of a neighbouring kit itself, whose parts
         are split and merged until there are as many as asked for
+    beside : the assigned stage of a neighbouring kit, which becomes one more start beside those
+        that are looked for from scratch
     settings : weights, stages, processes
     store : keeps checkpoints, from which an interrupted run goes on
     observer : sees every accepted step
@@ -150,7 +153,10 @@ def optimize_kit(
         bases = []
         if "relaxed" in found and all(isinstance(d, Evaluation) for d in found["relaxed"].designs):
             bases = [stages.inputs(), found["relaxed"].evaluations]
-        starts = assigned_from_starts(stages, result.at_parts, bases)
+        neighbours = []
+        if beside is not None:
+            neighbours = [resized(stages, beside, dict(parts or {}))]
+        starts = assigned_from_starts(stages, result.at_parts, bases, neighbours)
         announce("deployment of the assigned designs")
         opened = opened_stage(
             stages,

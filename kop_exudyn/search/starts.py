@@ -48,7 +48,8 @@ _SAME = 1e-6  # relative; starts whose predictions are that close are one
 class TriedStart:
     """One start of the assigned stage.
 
-    origin : "relaxed", or "model" for one that was found under a quadratic model
+    origin : "relaxed", "model" for one that was found under a quadratic model, or "neighbour" for
+        a kit of another size whose parts were split or merged
     built : J of the designs built of its kit, None where one failed
     optimised : J after the assigned stage; None where that didn't run or a design failed
     kept : whether it is the result
@@ -86,12 +87,16 @@ class Starts:
 
 
 def assigned_from_starts(
-    stages: Stages, built: StageResult, bases: Sequence[Sequence[Evaluation]]
+    stages: Stages,
+    built: StageResult,
+    bases: Sequence[Sequence[Evaluation]],
+    neighbours: Sequence[StageResult] = (),
 ) -> Starts:
     """The best of assigned stages from several starts, and what was tried.
 
     built : the relaxed designs at their parts, which is always a start
     bases : evaluations of all designs at which the objective is modelled, one list a base
+    neighbours : further starts, of kits of other sizes, not confirmed yet
 
     Effort says how many starts are looked for (`StageSettings.effort`). The start of the relaxed
     stage is one of them; they are optimised in the order of J, unless J is far above the lowest.
@@ -101,7 +106,11 @@ def assigned_from_starts(
     found = []
     if effort.clusterings and stages.rule.parts_move:
         found = model_starts(stages, bases, effort)
-    starts = [("relaxed", built), *(("model", start) for start in found)]
+    starts = [
+        ("relaxed", built),
+        *(("model", start) for start in found),
+        *(("neighbour", start) for start in neighbours if start.value is not None),
+    ]
     tried = [TriedStart(origin, start.value) for origin, start in starts]
     limit = _PROMISING * min(start.merit for _, start in starts)
     promising = [n for n in range(len(starts)) if n == 0 or starts[n][1].merit <= limit]

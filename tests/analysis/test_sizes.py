@@ -70,6 +70,22 @@ def test_no_kit_of_a_trade_off_deviates_more_than_a_smaller_one(designs):
     assert row["cost"] == pytest.approx(4 + 0.1 * pieces + 0.02 * (pieces - corners))
 
 
+def test_with_more_effort_each_size_is_sought_from_scratch_and_from_its_neighbour(designs):
+    """A kit merged from a larger one may be far from the best of its size."""
+    sizes = [{"linear": n, "angular": 2} for n in (2, 3)]
+    merged = trade_off(designs, sizes, settings=SETTINGS)
+    again = replace(SETTINGS, stages=replace(STAGES, effort="normal"))
+    kits = trade_off(designs, sizes, settings=again)
+    assert merged[0].origin == "3 linear, 2 angular"
+    assert {"relaxed", "neighbour"} <= {one.origin for one in kits[0].result.tried}
+    assert "neighbour" not in {one.origin for one in kits[1].result.tried}
+    assert {"direct", "relaxed", "assigned"} <= kits[0].result.stages.keys()
+    kept = next(one.origin for one in kits[0].result.tried if one.kept)
+    assert kits[0].origin == ("3 linear, 2 angular" if kept == "neighbour" else "scratch")
+    ends = [kit[0].result.stages["assigned"].value for kit in (kits, merged)]
+    assert ends[0] <= ends[1] * (1 + 1e-6)
+
+
 def test_the_smallest_kit_that_will_do(designs, middle):
     limit = 1.5 * deviation(middle)
     found, tried = smallest_kit(designs, limit, {"linear": 3, "angular": 2}, settings=SETTINGS)
