@@ -1,8 +1,9 @@
 """How many parts are enough: kits of neighbouring sizes, and the smallest one within a deviation.
 
 A kit of another size, with its parts split or merged (search/neighbours.py), is where the search
-for the smallest kit goes on, and one start among others in a trade-off. A larger kit is never worse than the smaller one it is compared with: where
-its own search ends with a larger deviation, the smaller kit with parts of it doubled is kept.
+for the smallest kit goes on, and one start among others in a trade-off. A larger kit is never worse
+than the smaller one it is compared with: where its own search ends with a larger deviation, the
+smaller kit with parts of it doubled is kept.
 """
 
 from __future__ import annotations
