@@ -91,8 +91,16 @@ def write(
     report.figure(
         "costs",
         draw_costs(rows),
-        "Largest deviation of every design in the state that it opens into, by what is required.",
+        "Largest deviation of every design in the state that it opens into, by what is required; "
+        "every class has its own scale.",
         alt="Deviations of opened designs by what is required",
+    )
+    report.table(
+        "levels",
+        level_rows(rows),
+        "Median and largest: of the designs' largest deviations in the states that they open into. "
+        "Utilisation: of the elastic limit. Of samples that snap there are more where one of a few "
+        "does.",
     )
     report.table(
         "designs",
@@ -145,7 +153,7 @@ def design_rows(name: str, level: str, result: KitResult) -> list[dict[str, Any]
                 "design": design.name,
                 "shown max %": shown.fit.max_percent if is_found(shown) else None,
                 "opened max %": opened.fit.max_percent if is_found(opened) else None,
-                "moved %": moved.get("moved_percent"),
+                "moved %": _felt(moved.get("moved_percent")),
                 "opens": bool(moved.get("same_state")),
                 "utilisation": max(stressed) if stressed else None,
                 "snapped": None if errors is None else errors["snapped"],
@@ -181,38 +189,81 @@ def under_snow(design: Design, result: KitResult, number: int) -> float | None:
     return max(found) if design.load_cases else None
 
 
+def _felt(percent: float | None) -> float | None:
+    """Without what solvers' tolerances leave."""
+    return None if percent is None else round(percent, 6)
+
+
 def is_found(outcome: Any) -> bool:
     """Whether a design has a state there."""
     return isinstance(outcome, Evaluation)
 
 
+def level_rows(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """One row a class and requirement; the last ones of all classes together."""
+    found = []
+    classes = list(dict.fromkeys(row["class"] for row in rows))
+    for name in classes + (["all"] if len(classes) > 1 else []):
+        for level in dict.fromkeys(row["required"] for row in rows):
+            own = [r for r in rows if r["required"] == level and name in (r["class"], "all")]
+            opened = _opened(own)
+            used = [row["utilisation"] for row in own if row["utilisation"] is not None]
+            snow = [row["snow"] for row in own if row["snow"] is not None]
+            found.append(
+                {
+                    "class": name,
+                    "required": level,
+                    "open as shown": f"{sum(row['opens'] for row in own)} of {len(own)}",
+                    "median max %": float(np.median(opened)) if opened else None,
+                    "largest max %": max(opened, default=None),
+                    "utilisation": max(used, default=None),
+                    "samples that snap": _snapped(own) or None,
+                    "carry the snow": _carry(snow) if snow else None,
+                }
+            )
+    return found
+
+
 def finding(rows: list[dict[str, Any]]) -> str:
-    """What the rows say: what all of it together costs and gains, then a sentence a level."""
-    sentences = _in_all(rows)
-    for level in dict.fromkeys(row["required"] for row in rows):
-        own = [row for row in rows if row["required"] == level]
-        opened = _opened(own)
-        opens = sum(row["opens"] for row in own)
-        more = []
-        used = [row["utilisation"] for row in own if row["utilisation"] is not None]
-        if used:
-            more.append(f"stress up to {100 * max(used):.0f} % of the limit")
-        if snapped := _snapped(own):
-            more.append(f"{snapped} samples snap")
-        snow = [row["snow"] for row in own if row["snow"] is not None]
-        if snow:
-            more.append(f"{sum(value <= CARRIED for value in snow)} of {len(snow)} carry the snow")
-        ends = (
-            f"and they open to {np.median(opened):.2g} % of the target in the median, "
-            f"{max(opened):.2g} % at most"
-            if opened
-            else "and none opens"
-        )
-        sentences.append(
-            f"Required {level}: {opens} of {len(own)} designs open into the state shown, {ends}"
-            f"{''.join(f', {one}' for one in more)}."
-        )
-    return " ".join(sentences)
+    """What the rows say in two sentences: what it costs and gains that designs open, forgive and
+    keep below their limit; and what it costs by class that they carry their load as well."""
+    levels = list(dict.fromkeys(row["required"] for row in rows))
+    of = {level: [row for row in rows if row["required"] == level] for level in levels}
+    without, last = of[levels[0]], levels[-1]
+    if last != LAST or len(levels) < 3:
+        return f"Not all has been required yet, only: {', '.join(levels)}."
+    built, loaded = of[levels[-2]], of[last]
+    before, now = _snapped(without), _snapped(built)
+    text = (
+        f"With {', '.join(level.removeprefix('+ ') for level in levels[1:-1])} required, "
+        f"{sum(row['opens'] for row in built)} of {len(built)} designs open into the state shown "
+        f"instead of {sum(row['opens'] for row in without)}"
+    )
+    if now:
+        text += f" and {now} samples snap instead of {before or 'none'}"
+    text += (
+        f"; the median of the designs' largest deviations, as they open, is {_median(built)} "
+        f"instead of {_median(without)}."
+    )
+    classes = dict.fromkeys(row["class"] for row in rows)
+    costs = [f"{_median(built, name)} to {_median(loaded, name)} of {name}" for name in classes]
+    carried = [
+        sum(r["snow"] is not None and r["snow"] <= CARRIED for r in own) for own in (loaded, built)
+    ]
+    return (
+        f"{text} That all carry snow as well, which {carried[0]} instead of {carried[1]} then do, "
+        f"changes this median from {', '.join(costs)}."
+    )
+
+
+def _median(rows: list[dict[str, Any]], name: str | None = None) -> str:
+    """Median of the opened designs' largest deviations, of one class or all."""
+    opened = _opened([row for row in rows if name in (row["class"], None)])
+    return f"{np.median(opened):.2g} %" if opened else "nowhere"
+
+
+def _carry(snow: list[float]) -> str:
+    return f"{sum(value <= CARRIED for value in snow)} of {len(snow)}"
 
 
 def _opened(rows: list[dict[str, Any]]) -> list[float]:
@@ -227,45 +278,32 @@ def _snapped(rows: list[dict[str, Any]]) -> str:
     return f"{sum(row['snapped'] or 0 for row in rows)} of {tried}" if tried else ""
 
 
-def _in_all(rows: list[dict[str, Any]]) -> list[str]:
-    """A sentence on the last level against the first one; none where there is one only."""
-    levels = list(dict.fromkeys(row["required"] for row in rows))
-    if len(levels) < 2:
-        return []
-    without, with_all = (
-        [row for row in rows if row["required"] == level] for level in (levels[0], levels[-1])
-    )
-    medians = []
-    for own in (without, with_all):
-        opened = _opened(own)
-        medians.append(f"{np.median(opened):.2g} %" if opened else "nowhere")
-    text = (
-        f"Where all is required, {sum(row['opens'] for row in with_all)} of {len(with_all)} "
-        f"designs open into the state shown instead of {sum(row['opens'] for row in without)}, "
-        f"and the median of their largest deviation, as they open, is {medians[1]} of the target "
-        f"instead of {medians[0]}"
-    )
-    before, now = _snapped(without), _snapped(with_all)
-    snaps = f"; {now} samples snap instead of {before or 'none'}" if now else ""
-    return [f"{text}{snaps}."]
-
-
 def draw_costs(rows: list[dict[str, Any]]) -> Figure:
-    """Opened deviations of all designs, one bar a requirement."""
-    designs = list(dict.fromkeys((row["class"], row["design"]) for row in rows))
+    """Opened deviations of all designs, one bar a requirement, one panel a class."""
+    classes = list(dict.fromkeys(row["class"] for row in rows))
+    names = {
+        of: list(dict.fromkeys(r["design"] for r in rows if r["class"] == of)) for of in classes
+    }
+    counts = [len(names[of]) for of in classes]
     with style():
-        figure = Figure(figsize=(max(5.0, 0.8 * len(designs) + 2.0), 3.6), layout="constrained")
-        axes = figure.add_subplot()
-        for k, (level, colour) in enumerate(zip(LEVELS, COLOURS)):
-            own = {(row["class"], row["design"]): row for row in rows if row["required"] == level}
-            if not own:  # a quick run looks at some of the levels
-                continue
-            heights = [own[key]["opened max %"] or 0.0 for key in designs]
-            places = np.arange(len(designs)) + 0.17 * (k - 2)
-            axes.bar(places, heights, 0.16, color=colour, label=level)
-        axes.set_xticks(np.arange(len(designs)), [name for _, name in designs], rotation=60)
-        axes.set_ylabel("opened, largest deviation in %")
-        axes.legend(title="required")
+        figure = Figure(figsize=(max(5.0, 0.62 * sum(counts) + 2.0), 3.8), layout="constrained")
+        panels = figure.subplots(1, len(classes), squeeze=False, width_ratios=counts)[0]
+        for axes, of in zip(panels, classes):
+            for k, (level, colour) in enumerate(zip(LEVELS, COLOURS)):
+                own = {
+                    row["design"]: row["opened max %"] or 0.0
+                    for row in rows
+                    if row["class"] == of and row["required"] == level
+                }
+                if own:  # a quick run looks at some of the levels
+                    places = np.arange(len(own)) + 0.17 * (k - 2)
+                    heights = [own[name] for name in names[of]]
+                    axes.bar(places, heights, 0.16, color=colour, label=level)
+            axes.set_xticks(np.arange(len(names[of])), names[of], rotation=60)
+            axes.set_title(of)
+        panels[0].set_ylabel("opened, largest deviation in %")
+        labels = panels[0].get_legend_handles_labels()
+        figure.legend(*labels, loc="outside lower center", ncols=5, title="required")
     return figure
 
 
