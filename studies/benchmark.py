@@ -23,6 +23,7 @@ from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.equilibrium.system import System
 from kop_exudyn.files.json_files import read_json
 from kop_exudyn.io.designs import load_design
+from kop_exudyn.units import plain_number
 from lib import benchmark_goals as goals
 from lib.benchmark import deployments, fresh, speedups, three_ways
 from lib.benchmark_figures import error_against_time, scaling_figure, steps_figure, ways_compared
@@ -158,7 +159,8 @@ def finding(goals_: list[dict]) -> str:
 
     def told(rows: list[dict]) -> str:
         return "; ".join(
-            f"{row['goal']}: {row['measured']:.3g} {row['unit']} ({row['asked']})" for row in rows
+            f"{row['goal']}: {plain_number(row['measured'])} {row['unit']} ({row['asked']})"
+            for row in rows
         )
 
     missed = [row for row in goals_ if row["met"] != "yes"]

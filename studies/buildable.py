@@ -233,9 +233,10 @@ def finding(rows: list[dict[str, Any]]) -> str:
     if last != LAST or len(levels) < 3:
         return f"Not all has been required yet, only: {', '.join(levels)}."
     built, loaded = of[levels[-2]], of[last]
+    names = [level.removeprefix("+ ") for level in levels[1:-1]]
     before, now = _snapped(without), _snapped(built)
     text = (
-        f"With {', '.join(level.removeprefix('+ ') for level in levels[1:-1])} required, "
+        f"With {' and '.join(filter(None, (', '.join(names[:-1]), names[-1])))} required, "
         f"{sum(row['opens'] for row in built)} of {len(built)} designs open into the state shown "
         f"instead of {sum(row['opens'] for row in without)}"
     )

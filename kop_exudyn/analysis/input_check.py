@@ -195,11 +195,13 @@ def harmonised(
 def _simulate(check: DesignCheck, design: Design, fit: bool) -> None:
     """What the design is like by itself."""
     try:
-        result = simulate(design)
+        result = simulate(design, warn=False)
     except SimulationFailure as failure:
         check.failed = str(failure)
         return
     check.max_percent, check.mean_percent = result.fit.max_percent, result.fit.mean_percent
+    new = [told for told in result.warnings if told not in check.cautions]
+    check.cautions = [*check.cautions, *new]
     check.displaced_percent = result.displaced_percent
     data = result.to_dict()
     check.max, strength = data["fit"]["max"], data["strength"]

@@ -105,6 +105,20 @@ class SimulationResult:
         return 100 * float(self.fit.displacements.max()) / self.fit.size
 
     @property
+    def warnings(self) -> list[str]:
+        """What a user should know of the design and of where it ended, in words."""
+        found = design_doubts(self.design)
+        if self.fit.max_percent > OFF_TARGET:
+            found += self.design.cautions
+        if self.displaced_percent > max(_FAR_AWAY, _SLID * self.fit.max_percent):
+            found.append(
+                f"on the surface, but joints end up to {self.displaced_percent:.3g} % of its size "
+                "away from their places: the structure hardly resists that motion. Hold it where "
+                "its supports will be: by the field held of a grid's file, or --held at import"
+            )
+        return found
+
+    @property
     def deviation(self) -> Mapping[str, float]:
         """How far the joints, and the pieces between them, are off the target: the field "fit" of
         results, see `Deviation.to_dict`."""
@@ -167,7 +181,9 @@ class SimulationResult:
         }
 
 
-def simulate(design: Design, loads: LoadCase | None = None, engine: str = FAST) -> SimulationResult:
+def simulate(
+    design: Design, loads: LoadCase | None = None, engine: str = FAST, *, warn: bool = True
+) -> SimulationResult:
     """Deploy a design and have Exudyn confirm its states, the one under loads included.
 
     Parameters
@@ -176,6 +192,7 @@ def simulate(design: Design, loads: LoadCase | None = None, engine: str = FAST) 
     engine : what solves for the states: "fast", this package's solver, or "exudyn", Exudyn from
         the same starts (see `equilibrium.exudyn_solver`), which takes longer. Target surfaces of
         C-shells, which are made by a simulation of their smooth design, are the fast solver's
+    warn : log the result's `warnings`
 
     Raises
     ------
@@ -204,8 +221,6 @@ def simulate(design: Design, loads: LoadCase | None = None, engine: str = FAST) 
         raise SimulationFailure(failure.reason + doubts, where=failure.where).within(
             design.name
         ) from None
-    for doubt in design_doubts(design):
-        log.warning("%s: %s", design.name, doubt)
     fitted = design.fitted_role.name
     joints = design.report_positions(confirmations[fitted].state)
     fit = TargetFitting(target).minimum_zone(confirmations[fitted].state.positions[design.joints])
@@ -235,15 +250,6 @@ def simulate(design: Design, loads: LoadCase | None = None, engine: str = FAST) 
         engine,
         checks,
     )
-    if fit.max_percent > OFF_TARGET:
-        for caution in design.cautions:
-            log.warning("%s: %s", design.name, caution)
-    if result.displaced_percent > max(_FAR_AWAY, _SLID * fit.max_percent):
-        log.warning(
-            "%s: on the surface, but joints end up to %.3g %% of its size away from their "
-            "places: the structure hardly resists that motion. Hold it where its supports will be: "
-            "by the field held of a grid's file, or --held at import",
-            design.name,
-            result.displaced_percent,
-        )
+    for warning in result.warnings if warn else ():
+        log.warning("%s: %s", design.name, warning)
     return result

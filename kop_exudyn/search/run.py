@@ -165,6 +165,7 @@ def optimize_kit(
             last_resorts=False,
             seen=[each for seen in starts.seen.values() for each in seen],
         )
+        announce("errors of the workshop and largest deviations")
         forgiving = forgiving_from_starts(stages, starts, opened, result.at_parts)
         rivals = [found[name] for name in ("direct", "unrelaxed") if name in found]
         numbers = count(1)

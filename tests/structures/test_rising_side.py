@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 import kop_exudyn as kop
+from kop_exudyn.analysis.input_check import check_designs
 from kop_exudyn.exchange.polygons import write_mesh_obj
 
 SMALL = Path(__file__).resolve().parents[2] / "models" / "small"
@@ -52,3 +53,11 @@ def test_simulating_says_so(shells, caplog):
     other = kop.simulate(shells("down", "down"))
     assert other.fit.max_percent < 0.5 * result.fit.max_percent
     assert "rises" not in caplog.text
+
+
+def test_checking_says_so_once(shells, caplog):
+    """A warning of the simulation said it as well."""
+    (check,) = check_designs([shells(None, "down")], {"linear": 2, "angular": 2}, fit=False)
+    (told,) = check.cautions
+    assert "rises up" in told
+    assert "rises up" not in caplog.text
