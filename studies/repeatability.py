@@ -25,6 +25,7 @@ from kop_exudyn.drawing.style import PALETTE, style
 from kop_exudyn.io.datasets import select_files
 from lib.repeated import repeated_task, spread_percent
 from lib.study import Study
+from lib.study_tasks import QUICK, changed
 from lib.sweep import Task
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
@@ -36,15 +37,6 @@ CASES = (
     ("umbrella meshes", "umbrellas", 6, {"cell": 8}),
     ("C-shells", "conformals", 5, {"linear": 12, "angular": 5}),
 )
-QUICK: dict[str, Any] = {
-    "schedule": (1e3, 1e5),
-    "relaxed_steps": 2,
-    "round_steps": 2,
-    "reassignments": 1,
-    "leaps": 0,
-    "path_steps": 2,
-    "effort": "quick",
-}
 
 
 def main() -> None:
@@ -60,7 +52,7 @@ def main() -> None:
             {
                 "files": select_files(MODELS / folder, count),
                 "parts": parts,
-                "stages": QUICK if study.quick else {},
+                "stages": changed(QUICK) if study.quick else {},
                 "seed": seed,
             },
             {"jobs": jobs},

@@ -61,7 +61,7 @@ Tried = list[tuple[StressCase, Outcome]]
 
 def main() -> None:
     study = Study.from_command_line(__doc__, __file__)
-    share, effort = (200, "quick") if study.quick else (1, "normal")
+    share, effort = (500, "quick") if study.quick else (1, "normal")
     library()  # compiled now, where it has to be
     classical = classical_cases(CLASSICAL[:1] if study.quick else CLASSICAL)
     random = [tried(seed) for seed in tqdm(range(1000 // share), "random structures", disable=None)]
@@ -73,7 +73,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         fuzzed = fuzz(tqdm(range(100_000 // share), "damaged files", disable=None), Path(folder))
         memory = peak_memory_mb()
-        interrupted = interruptions(6 if study.quick else 1, effort)
+        interrupted = interruptions(12 if study.quick else 1, effort)
         killed = kill_processes(Path(folder), max(1, 50 // share), effort)
 
     both = random + symmetric

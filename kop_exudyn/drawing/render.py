@@ -95,32 +95,30 @@ def render(
     vertices, faces, colours, ground = _joined(bodies)
     w, h = samples * width, samples * height
     owner, depth = _seen(vertices, faces, camera, w, h)
-    points = _points(depth, camera, w, h)
-    normals = _normals(vertices, faces)
     hit = owner >= 0
-    face = owner[hit]
-    at, n = points[hit], normals[face]
-    view = camera.eye - at
-    n = np.where(np.sum(n * view, axis=1)[:, None] < 0, -n, n)  # both sides of a face look alike
     radius, centre = _extent(vertices, faces, ground)
-    one = _shared_light(hit, ground[np.maximum(owner, 0)] & hit, samples)
-    alone = one == np.arange(len(one))
-    lit = np.empty(len(one))
-    lit[alone] = _light_on(at[alone], n[alone], vertices, faces[~ground], light, radius, centre)
-    lit = lit[one]
+    one = _shared(hit, ground[np.maximum(owner, 0)] & hit, samples)
+    alone = one == np.arange(len(one))  # the others have the colour of one of these
+    places = np.flatnonzero(hit)[alone]
+    face, at = owner.ravel()[places], _points(depth, camera, places)
+    n, on_ground = _normals(vertices, faces)[face], ground[face]
+    away = np.sum(n * (camera.eye - at), axis=1) < 0
+    n[away] = -n[away]  # both sides of a face look alike
+    lit = _light_on(at, n, vertices, faces[~ground], light, radius, centre)
     base = to_linear(np.asarray(background, float))
-    picture = np.tile(base, (h, w, 1))
-    colour = to_linear(colours[face]) * lit[:, None]
-    far = np.linalg.norm((at - centre)[:, :2], axis=1) / radius
-    fade = np.where(ground[face], np.clip((far - 1.4) / 2.6, 0, 1), 0.0)[:, None]
+    colour = to_linear(colours)[face] * lit[:, None]
+    far = np.linalg.norm((at[on_ground] - centre)[:, :2], axis=1) / radius
+    fade = np.clip((far - 1.4) / 2.6, 0, 1)[:, None]
     fade = fade * fade * (3 - 2 * fade)
-    picture[hit] = (1 - fade) * colour + fade * base
+    colour[on_ground] = (1 - fade) * colour[on_ground] + fade * base
+    picture = np.tile(base, (h, w, 1))
+    picture[hit] = colour[(np.cumsum(alone) - 1)[one]]
     mean = picture.reshape(height, samples, width, samples, 3).mean(axis=(1, 3))
     return np.clip(to_srgb(np.clip(mean, 0, 1)), 0, 1)
 
 
-def _shared_light(hit: np.ndarray, ground: np.ndarray, samples: int) -> np.ndarray:
-    """Number, for every sample (h, w) that is hit, of the one whose light it takes: on the ground,
+def _shared(hit: np.ndarray, ground: np.ndarray, samples: int) -> np.ndarray:
+    """Number, for every sample (h, w) that is hit, of the one whose colour it takes: on the ground,
     where light changes slowly, that of its pixel's first sample."""
     h, w = hit.shape
     numbers = np.full((h, w), -1)
@@ -165,12 +163,13 @@ def _seen(
     return np.where(owner >= 0, numbers[np.maximum(owner, 0)], -1), 1 / np.maximum(inverse, 1e-12)
 
 
-def _points(depth: np.ndarray, camera: Camera, w: int, h: int) -> np.ndarray:
-    """(h, w, 3) the points at these depths."""
+def _points(depth: np.ndarray, camera: Camera, places: np.ndarray) -> np.ndarray:
+    """(m, 3) the points at the depths (h, w) of some samples, numbered row by row."""
+    h, w = depth.shape
+    row, column = np.divmod(places, w)
     scale = 0.5 * h / np.tan(0.5 * camera.angle)
-    x = (np.arange(w) + 0.5 - 0.5 * w) / scale
-    y = -(np.arange(h) + 0.5 - 0.5 * h) / scale
-    local = np.stack(np.broadcast_arrays(x[None, :], y[:, None], 1.0), axis=-1) * depth[..., None]
+    x, y = (column + 0.5 - 0.5 * w) / scale, -(row + 0.5 - 0.5 * h) / scale
+    local = np.stack([x, y, np.ones(len(places))], axis=1) * depth.ravel()[places][:, None]
     return local @ camera.axes() + camera.eye
 
 

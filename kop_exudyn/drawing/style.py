@@ -88,8 +88,8 @@ def deviation_colours() -> Colormap:
 def figure_bytes(figure: Figure, suffix: str) -> bytes:
     """The figure as "svg", "pdf" or "png", without the date.
 
-    Its parts are placed when it is drawn first, and stay where they are: to place them takes as
-    long as to draw them, and all its files look the same.
+    Its parts are placed once, before it is drawn first, and stay where they are: to place them
+    takes as long as to draw them, and all its files look the same.
     """
     metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {"Software": None}}[
         suffix
@@ -97,8 +97,10 @@ def figure_bytes(figure: Figure, suffix: str) -> bytes:
     buffer = io.BytesIO()
     show_dollars(figure)
     with style():
+        if figure.get_layout_engine() is not None:
+            figure.draw_without_rendering()
+            figure.set_layout_engine(None)  # with "none" it would be drawn twice to be placed
         figure.savefig(buffer, format=suffix, metadata=metadata)
-    figure.set_layout_engine("none")
     return buffer.getvalue()
 
 

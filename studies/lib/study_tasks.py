@@ -27,6 +27,9 @@ QUICK = StageSettings(
     restarts=5,
     effort="quick",
     levelling=0,
+    # these two are the published method's as well, which takes its steps whatever is said above
+    last_tolerance=0.1,
+    assigned_tolerance=0.1,
     requirements=Requirements(samples=0),
 )
 
