@@ -118,7 +118,7 @@ def _content(args: argparse.Namespace) -> dict[str, Any]:
         raise InputError("an umbrella mesh on a surface needs --patch", source=args.file)
     foreign = foreign_format(data)
     if foreign is None or foreign.rewrite is None:
-        edges = "; of a mesh or graph of COMPAS, --edges reads the edges as laths"
+        edges = "; of a mesh or graph, --edges reads the edges as laths"
         raise InputError(
             f"isn't a {' or a '.join(format_names())}, nor has curves; of a surface, give --patch"
             f"{edges if holds_edges(data) else ''}",

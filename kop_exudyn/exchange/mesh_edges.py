@@ -1,5 +1,6 @@
 """Nets that are drawn as meshes or graphs: the edges of faces in OBJ and PLY files, of COMPAS
-meshes and graphs."""
+meshes and graphs, and of JSON files that list nodes and edges, as networkx and scripts write them.
+"""
 
 from __future__ import annotations
 
@@ -22,6 +23,11 @@ from .outlines import place_of
 
 EDGE_SUFFIXES = (".obj", ".ply", ".json")
 Edges = tuple[np.ndarray, list[tuple[int, int]]]
+
+# names under which JSON files list nodes, their places, edges and these ones' ends
+_NODES, _EDGES = ("nodes", "vertices", "points"), ("links", "edges", "lines")
+_PLACES = ("pos", "position", "xyz", "point", "coordinates")
+_FROM_TO = (("source", "target"), ("u", "v"), ("start", "end"), ("from", "to"))
 
 
 def edges_of(path: Path) -> Drawing:
@@ -66,7 +72,7 @@ def edges_of(path: Path) -> Drawing:
 
 
 def holds_edges(data: Any) -> bool:
-    """Whether the content of a JSON file has a mesh or graph of COMPAS."""
+    """Whether the content of a JSON file has a mesh or graph."""
     return any(True for _ in _structures(data))
 
 
@@ -82,17 +88,72 @@ def _of_ply(content: bytes) -> Edges:
     return found.vertices, own or _sides(found.polygons)
 
 
-def _of_compas(content: bytes) -> Edges:
+def _of_json(content: bytes) -> Edges:
     """Of the one mesh or graph in the file."""
     try:
         found = list(_structures(json.loads(content.decode("utf-8-sig"))))
         if len(found) != 1:
-            raise InputError(f"expected one COMPAS mesh or graph, found {len(found)}")
+            raise InputError(f"expected one mesh or graph, found {len(found)}")
+        if _names_of_lists(found[0]) is not None:
+            return _listed_edges(found[0])
         return _mesh_edges(found[0]) if "face" in found[0] else _graph_edges(found[0])
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"can't be read as JSON of COMPAS: {str(error)[:100]}") from None
+        raise InputError(f"can't be read as a mesh or graph: {str(error)[:100]}") from None
+
+
+def _names_of_lists(data: Mapping[str, Any]) -> tuple[str, str] | None:
+    """Under which names a graph lists its nodes and its edges (or a mesh its faces); None where it
+    doesn't."""
+    of_nodes, of_edges = (
+        next((name for name in names if isinstance(data.get(name), list)), None)
+        for names in (_NODES, (*_EDGES, "faces"))
+    )
+    return None if of_nodes is None or of_edges is None else (of_nodes, of_edges)
+
+
+def _listed_edges(data: Mapping[str, Any]) -> Edges:
+    """Of lists of nodes and edges, or faces: of the node-link data of networkx, and alike."""
+    of_nodes, of_edges = _names_of_lists(data) or ("", "")
+    nodes = data[of_nodes]
+    points = np.array([_place_of_node(node) for node in nodes]).reshape(-1, 3)
+    if not (np.abs(points) <= LARGEST).all():
+        raise InputError("has a node without finite coordinates")
+    numbers = {
+        _key(node.get("id", node.get("key", k)) if isinstance(node, Mapping) else k): k
+        for k, node in enumerate(nodes)
+    }
+
+    def number(of: Any) -> int:
+        if _key(of) not in numbers:
+            raise InputError("an edge ends at a node that isn't there", field=of_edges, value=of)
+        return numbers[_key(of)]
+
+    chains = [[number(end) for end in _ends(edge)] for edge in data[of_edges]]
+    if of_edges == "faces":
+        return points, _sides(chains)
+    return points, sorted({(min(p), max(p)) for c in chains for p in zip(c, c[1:]) if p[0] != p[1]})
+
+
+def _place_of_node(node: Any) -> list[float]:
+    """Its coordinates, of two numbers in the plane z = 0."""
+    if isinstance(node, Mapping):
+        held = next((node[name] for name in _PLACES if name in node), node)
+        node = [held["x"], held["y"], held.get("z", 0.0)] if isinstance(held, Mapping) else held
+    if not 2 <= len(node) <= 3:
+        raise InputError("has a node without two or three coordinates", value=node)
+    return [*map(float, node), 0.0][:3]
+
+
+def _ends(edge: Any) -> Sequence[Any]:
+    """The nodes that an edge joins, one after the other."""
+    if not isinstance(edge, Mapping):
+        return list(edge)
+    for begin, end in _FROM_TO:
+        if begin in edge and end in edge:
+            return [edge[begin], edge[end]]
+    raise InputError("has an edge without source and target", value=dict(edge))
 
 
 def _mesh_edges(data: Mapping[str, Any]) -> Edges:
@@ -145,18 +206,20 @@ def _sides(polygons: Iterable[Sequence[int]]) -> list[tuple[int, int]]:
 _READERS: dict[str, Callable[[bytes], Edges]] = {
     ".obj": _of_obj,
     ".ply": _of_ply,
-    ".json": _of_compas,
+    ".json": _of_json,
 }
 
 
 def _structures(data: Any) -> Iterator[Mapping[str, Any]]:
-    """All meshes and graphs among the objects of a COMPAS file."""
+    """All meshes and graphs among the objects of a JSON file."""
     if isinstance(data, list):
         for item in data:
             yield from _structures(item)
     elif isinstance(data, dict):
         pairs = (("vertex", "face"), ("node", "edge"))
-        if any(all(isinstance(data.get(name), dict) for name in pair) for pair in pairs):
+        if any(all(isinstance(data.get(name), dict) for name in pair) for pair in pairs) or (
+            _names_of_lists(data) is not None
+        ):
             yield data
         else:
             for item in data.values():

@@ -304,10 +304,55 @@ def _compas_graph() -> str:
     return json.dumps({"dtype": "compas.datastructures/Graph", "data": data})
 
 
+def _pairs() -> list[tuple[int, int]]:
+    sides = [(a - 1, b - 1) for face in SQUARES for a, b in zip(face, [*face[1:], face[0]])]
+    return sorted({(min(pair), max(pair)) for pair in sides})
+
+
+@case("edges_of_networkx.json", _EDGES)
+def _networkx() -> str:
+    """As node_link_data writes a grid_2d_graph with places: nodes are pairs of numbers."""
+    nodes = [{"pos": [k % 4, k // 4], "id": [k % 4, k // 4]} for k in range(12)]
+    links = [{"source": nodes[a]["id"], "target": nodes[b]["id"]} for a, b in _pairs()]
+    data = {"directed": False, "multigraph": False, "graph": {}, "nodes": nodes, "links": links}
+    return json.dumps(data)
+
+
+@case("edges_of_newer_networkx.json", _EDGES)
+def _newer_networkx() -> str:
+    """Version 3.4 calls them edges; attributes are what the user called them."""
+    nodes = [{"x": k % 4, "y": k // 4, "z": 0, "id": f"n{k}"} for k in range(12)]
+    edges = [{"weight": 1.0, "source": f"n{a}", "target": f"n{b}"} for a, b in _pairs()]
+    return json.dumps({"directed": True, "nodes": nodes, "edges": edges})
+
+
+case("edges_of_lists.json", _EDGES)(
+    lambda: json.dumps({"vertices": [[k % 4, k // 4, 0] for k in range(12)], "edges": _pairs()})
+)
+case("faces_of_lists.json", _EDGES)(
+    lambda: json.dumps(
+        {
+            "net": {
+                "vertices": [{"x": k % 4, "y": k // 4} for k in range(12)],
+                "faces": [[k - 1 for k in face] for face in SQUARES],
+            }
+        }
+    )
+)
 case(
-    "edges_of_points.json", Refused("expected one COMPAS mesh or graph, found 0", {"edges": True})
-)(lambda: json.dumps({"dtype": "compas.geometry/Point", "data": [0, 0, 0]}))
-case("edges_that_reach_nothing.json", Refused("can't be read as JSON of COMPAS", {"edges": True}))(
+    "edges_to_nowhere.json",
+    Refused("edges = 2: an edge ends at a node that isn't", {"edges": True}),
+)(lambda: json.dumps({"nodes": [[0, 0], [1, 0]], "edges": [[0, 2]]}))
+case(
+    "nodes_without_places.json", Refused("can't be read as a mesh or graph: 'x'", {"edges": True})
+)(lambda: json.dumps({"nodes": [{"id": 0}, {"id": 1}], "links": [{"source": 0, "target": 1}]}))
+case("edges_without_ends.json", Refused("an edge without source and target", {"edges": True}))(
+    lambda: json.dumps({"nodes": [[0, 0], [1, 0]], "links": [{"a": 0, "b": 1}]})
+)
+case("edges_of_points.json", Refused("expected one mesh or graph, found 0", {"edges": True}))(
+    lambda: json.dumps({"dtype": "compas.geometry/Point", "data": [0, 0, 0]})
+)
+case("edges_that_reach_nothing.json", Refused("can't be read as a mesh or graph", {"edges": True}))(
     lambda: json.dumps({"node": places(), "edge": {"0": {"99": {}}}})
 )
 case("edges_without_places.json", Refused("have its nodes no coordinates?", {"edges": True}))(

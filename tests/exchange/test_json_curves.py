@@ -134,7 +134,10 @@ def test_other_json_files_are_no_drawings(tmp_path, capsys):
     path.write_text(json.dumps(SCISSORS))
     assert main(["import", str(path)]) == 2
     error = capsys.readouterr().err
-    assert "nor has curves; of a surface, give --patch" in error and "--edges" not in error
+    assert "nor has curves; of a surface, give --patch" in error and "--edges" in error
+    path.write_text(json.dumps({"vertices": [[0, 0], [1, 0]]}))
+    assert main(["import", str(path)]) == 2
+    assert "--edges" not in capsys.readouterr().err
     node = {str(k): {"x": k, "y": 0, "z": 0} for k in range(2)}
     path.write_text(json.dumps({"node": node, "edge": {"0": {"1": {}}}}))
     assert main(["import", str(path)]) == 2
