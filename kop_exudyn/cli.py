@@ -17,11 +17,11 @@ from keyword import iskeyword
 from pathlib import Path
 from typing import NoReturn
 
-from . import __version__
 from .commands import NAMES
 from .commands.colour import RED, LogFormatter, coloured
 from .commands.help_text import HelpFormatter
 from .errors import InputError, OccupiedError, SimulationFailure, did_you_mean
+from .provenance import __version__
 
 # Imports make many objects that stay. To look through them for garbage after every 700 new ones, as
 # Python does by itself, takes 6 % of the processor time of `kop simulate`; to do so once more when

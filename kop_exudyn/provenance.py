@@ -1,4 +1,4 @@
-"""What a result was made by: the package's own code, and the machine."""
+"""What a result was made by: the package's own code and version, and the machine."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import platform
 import subprocess
 from functools import cache
 from pathlib import Path
+
+__version__ = "0.1.0"
 
 _PACKAGE = Path(__file__).resolve().parent
 _SOURCES = (".py", ".c", ".h", ".json")

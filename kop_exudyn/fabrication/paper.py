@@ -14,11 +14,11 @@ from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from .. import __version__
 from ..drawing.labels import text_extent
 from ..drawing.style import FAINT, INK, QUIET, show_dollars, style
 from ..errors import InputError
 from ..files.files import write_bytes
+from ..provenance import __version__
 
 PAPERS = {"a4": (297.0, 210.0), "a3": (420.0, 297.0)}  # mm, across
 # Millimetres of a thing that one millimetre on paper shows: those that rulers have, and some

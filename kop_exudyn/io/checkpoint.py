@@ -11,13 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__
 from ..errors import InputError, OccupiedError
 from ..files.arrays import load_arrays, save_arrays, sealed, unsealed
 from ..files.documents import check_envelope
 from ..files.files import is_temporary, make_folder, read_bytes
 from ..files.json_files import plain, read_json, write_json
-from ..provenance import code_digest
+from ..provenance import __version__, code_digest
 
 CHECKPOINT_VERSION = 1
 _JOB_FILE = "job.json"

@@ -8,10 +8,9 @@ from datetime import date
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from .. import __version__
 from ..compiled.build import instruction_set
 from ..compiled.library import library
-from ..provenance import code_digest, commit, memory_gb, processor, usable_cores
+from ..provenance import __version__, code_digest, commit, memory_gb, processor, usable_cores
 from ..search import memory
 
 # the packages whose versions can change numbers
