@@ -10,12 +10,15 @@ from typing import Any
 from ..analysis.simulation import SimulationResult
 from ..errors import InputError
 from ..fabrication.pieces import PartsList, parts_list_of
-from ..files.files import file_stem, make_folder
+from ..files.files import file_stem, make_folder, write_text
 from ..files.tables import write_csv
 from ..search.evaluation import Evaluation
 from ..search.result import KitResult
 from ..structures.base import Target
+from ..units import Units
+from ..wording import counted
 from .compas_json import write_compas
+from .desk_read_me import desk_read_me
 from .gltf import write_glb
 from .meshes import sweep
 from .polygons import write_mesh_obj, write_obj, write_ply
@@ -71,7 +74,8 @@ def export_desk(
     if "csv" in formats:
         tables = result_tables(result) | {"parts": part_rows(parts)}
         done += _write_tables(tables, folder, overwrite)
-    return done
+    title = f"Kit of {counted(len(result.designs), 'design')}, stage {stage}: for other programs"
+    return _with_read_me(done, folder, title, result.units, overwrite)
 
 
 def export_simulation(
@@ -96,7 +100,15 @@ def export_simulation(
     if "csv" in formats:
         rows = [row for state in states for row in rod_rows(state)]
         done += _write_tables({f"{stem}_rods": rows}, folder, overwrite)
-    return done
+    title = f"{result.design.name}: for other programs"
+    return _with_read_me(done, folder, title, result.design.units, overwrite)
+
+
+def _with_read_me(
+    done: Sequence[Path], folder: Path, title: str, units: Units | None, overwrite: bool
+) -> list[Path]:
+    text = desk_read_me(title, units, done)
+    return [*done, write_text(folder / "READ_ME.txt", text, overwrite=overwrite)]
 
 
 def _write_states(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -101,7 +100,7 @@ def export_workshop(
         "templates": template_sheets(blanks, force=force),
     }.items():
         done += _write_sheets(found, folder / stem, writers, overwrite)
-    text = read_me(title, blanks, done, {path.name: _columns(path) for path in done})
+    text = read_me(title, blanks, done)
     return [*done, write_text(folder / "READ_ME.txt", text, overwrite=overwrite)]
 
 
@@ -113,14 +112,6 @@ def _bars(blanks: Blanks, force: bool) -> StockPlan | None:
         if not force:
             raise
         return None
-
-
-def _columns(path: Path) -> list[str]:
-    """Names of a table's columns; none of other files."""
-    if path.suffix != ".csv":
-        return []
-    with path.open(newline="", encoding="utf-8") as file:
-        return next(csv.reader(file), [])
 
 
 def bar_rows(plan: StockPlan | None) -> list[dict[str, object]]:

@@ -3,26 +3,24 @@ columns of the tables mean."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from textwrap import fill
 
+from ..files.read_me import read_me_text
 from .blanks import Blanks
 from .sources import EITHER, sources
 
-_WIDTH = 88
-# File names without their endings, the first that fits counts.
+# Beginnings of file names; the first that fits counts.
 _FILES = {
-    r"workshop$": "all of it to print: the lists, every part with its dimensions, bars, sheets, "
+    r"workshop\.": "all of it to print: the lists, every part with its dimensions, bars, sheets, "
     "and of every design its steps, drawing and joints. Print at 100 %; pages that are to scale "
     "have a bar to check that by",
-    r"cut_list$": "one line a part: how many to make, and how to cut it",
-    r"material$": "what the parts take, and the bars and sheets to buy for them",
-    r"fasteners$": "bolts or pins, as many as the design with most of them needs",
-    r"stock$": "these pieces as a stock, from which other designs can be sought: kop optimize "
+    r"cut_list\.": "one line a part: how many to make, and how to cut it",
+    r"material\.": "what the parts take, and the bars and sheets to buy for them",
+    r"fasteners\.": "bolts or pins, as many as the design with most of them needs",
+    r"stock\.": "these pieces as a stock, from which other designs can be sought: kop optimize "
     "DESIGNS --stock stock.csv. Change the counts to what is there",
-    r"bars$": "which piece is sawn from which bar, in order",
+    r"bars\.": "which piece is sawn from which bar, in order",
     r"bill_": "how many pieces of each part the design of that name needs",
     r"steps_": "in which order that design is put together",
     r"assembly_": "where each piece of that design goes, which way round, and what it meets",
@@ -98,42 +96,9 @@ _COLUMNS = {
 }
 
 
-def read_me(
-    title: str, blanks: Blanks, files: Sequence[Path], tables: Mapping[str, Sequence[str]]
-) -> str:
-    """The text of READ_ME.txt.
-
-    files : all that lie in the folder; tables : columns of those that are tables, by file name
-
-    Every file and every column of a table is explained; those that nothing is known of are listed
-    by name.
-    """
+def read_me(title: str, blanks: Blanks, files: Sequence[Path]) -> str:
+    """The text of READ_ME.txt; files : all that lie in the folder."""
     source = sources(blanks)
-    lines = [title, "", fill("All lengths are in millimetres, angles in degrees.", _WIDTH), ""]
-    for sentence in (source.note, EITHER if source.either else ""):
-        lines += [fill(sentence, _WIDTH), ""] if sentence else []
-    lines += ["FILES", ""]
-    names = {path.name: explained(path.stem, _FILES) for path in files}
-    lines += [*_entries(names), "", "COLUMNS OF THE TABLES", ""]
-    columns = dict.fromkeys(name for names in tables.values() for name in names)
-    lines += _entries({name: explained(name, _COLUMNS, whole=True) for name in columns})
-    return "\n".join([*lines, ""])
-
-
-def explained(name: str, known: Mapping[str, str], *, whole: bool = False) -> str:
-    """What a name means, by the first pattern that fits its beginning, or all of it; or ""."""
-    match = re.fullmatch if whole else re.match
-    return next((text for pattern, text in known.items() if match(pattern, name)), "")
-
-
-def _entries(texts: Mapping[str, str]) -> list[str]:
-    """Names with what they mean below, those that mean the same together."""
-    groups: dict[str, list[str]] = {}
-    for name, text in texts.items():
-        groups.setdefault(text, []).append(name)
-    lines, indent = [], "    "
-    for text, names in groups.items():
-        lines.append(fill(", ".join(names), _WIDTH, break_long_words=False))
-        if text:
-            lines.append(fill(text, _WIDTH, initial_indent=indent, subsequent_indent=indent))
-    return lines
+    sentences = ["All lengths are in millimetres, angles in degrees.", source.note]
+    sentences += [EITHER] if source.either else []
+    return read_me_text(title, sentences, files, _FILES, _COLUMNS)

@@ -4,10 +4,12 @@ import csv
 
 import numpy as np
 import pytest
+from support.read_me import assert_explained
 
+import kop_exudyn as kop
 from kop_exudyn.drawing.colours import part_colours, to_linear, to_srgb, value_colours
 from kop_exudyn.errors import SimulationFailure
-from kop_exudyn.exchange.export import export_desk
+from kop_exudyn.exchange.export import export_desk, export_simulation
 from kop_exudyn.exchange.result_tables import result_tables
 from kop_exudyn.files.files import file_stem
 from kop_exudyn.files.tables import csv_text
@@ -118,3 +120,13 @@ def test_colours():
     brightness = value_colours(np.linspace(0, 1, 20)) @ [0.2126, 0.7152, 0.0722]
     assert (np.diff(brightness) < 0).all()
     np.testing.assert_array_equal(value_colours(np.array([np.nan])), [[0.6, 0.6, 0.6]])
+
+
+def test_every_file_and_column_is_explained_beside_them(result, repository, tmp_path):
+    export_desk(result, tmp_path / "kit")
+    assert_explained(tmp_path / "kit")
+    design = kop.load_design(repository / "models" / "grids" / "01_dome.json")
+    export_simulation(kop.simulate(design), tmp_path / "design", formats=["obj", "csv"])
+    assert_explained(tmp_path / "design")
+    text = (tmp_path / "design" / "READ_ME.txt").read_text(encoding="utf-8")
+    assert "Lengths are in m, forces in N" in text and "_rods.csv" in text

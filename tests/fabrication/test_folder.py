@@ -5,6 +5,7 @@ import csv
 import numpy as np
 import pypdf
 import pytest
+from support.read_me import assert_explained
 
 import kop_exudyn as kop
 from kop_exudyn.errors import InputError
@@ -13,7 +14,6 @@ from kop_exudyn.fabrication.blanks import Blanks
 from kop_exudyn.fabrication.folder import export_workshop
 from kop_exudyn.fabrication.options import CutOptions
 from kop_exudyn.fabrication.pieces import parts_list
-from kop_exudyn.fabrication.read_me import _COLUMNS, _FILES, explained
 from kop_exudyn.fabrication.stock import stock_plan
 from kop_exudyn.io.stocks import load_stock
 from kop_exudyn.kit.cluster import cluster
@@ -103,16 +103,6 @@ def test_its_pieces_are_a_stock_for_other_designs(parts, folder):
 def test_every_file_and_column_is_explained_beside_them(folder):
     """By a text of its own: what nothing is known of stands there without any."""
     assert_explained(folder)
-
-
-def assert_explained(folder):
-    text = (folder / "READ_ME.txt").read_text(encoding="utf-8")
-    for path in folder.iterdir():
-        if path.name != "READ_ME.txt":
-            assert path.name in " ".join(text.split()) and explained(path.stem, _FILES)
-            if path.suffix == ".csv":
-                for name in read(path)[0]:
-                    assert name in text and explained(name, _COLUMNS, whole=True), name
 
 
 def test_slits_and_cells_are_explained_too(repository, tmp_path):
