@@ -80,7 +80,8 @@ class _Parser(argparse.ArgumentParser):
             value = getattr(args, action.dest, None)
             if action.type is Path and action.dest not in _WRITTEN and value is not None:
                 for path in value if isinstance(value, list) else [value]:
-                    yield path, "file" if path.suffix or action.option_strings else "folder"
+                    file = path.suffix or action.option_strings or action.dest == "file"
+                    yield path, "file" if file else "folder"
 
 
 def _suggesting(message: str) -> str:
@@ -111,6 +112,8 @@ def _nearby(path: Path) -> str:
         return ""
     # endings are alike for all: names in front of them are compared
     stems = {name.split(".")[0].lower(): name for name in reversed(names)}
+    if os.path.islink(path):
+        return f": a link to {os.readlink(path)}, which isn't there"
     near = get_close_matches(path.name.split(".")[0].lower(), list(stems), 1, _ALIKE)
     return f" (did you mean {str(path.parent / stems[near[0]])!r}?)" if near else ""
 

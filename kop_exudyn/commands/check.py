@@ -57,15 +57,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from ..analysis.input_check import check_designs
     from ..errors import InputError
+    from ..io.rescaling import check_rescaled
     from ..io.studies import load_study
     from ..structures.serving import served_by
     from .optimize import singular
 
-    if (args.harmonise is None) != (args.out is None):
-        raise InputError(
-            "--harmonise writes to a folder: give it with --out",
-            field="--out" if args.out is None else "--harmonise",
-        )
+    if args.harmonise is not None and args.out is None:
+        raise InputError("names the folder that --harmonise writes to: give it", field="--out")
+    if args.harmonise is None and args.out is not None:
+        raise InputError("is for rescaled designs: give the range as well", field="--harmonise")
     if args.harmonise is not None:
         low, high = args.harmonise
         if not 0 < low <= 1 <= high:
@@ -75,6 +75,8 @@ def run(args: argparse.Namespace) -> int:
                 value=f"{low:g},{high:g}",
             )
     study = load_study(args.folder, args.designs)
+    if args.out is not None:
+        check_rescaled(study.files, args.out)
     given = {singular(k): n for k, n in {**study.parts, **(args.parts or {})}.items()}
     designs = served_by(study.designs(), given)
     counts: dict[str, int] = {}

@@ -181,7 +181,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     shell.add_argument(
         "--edges",
         action="store_true",
-        help="of a mesh (.obj, .ply, COMPAS .json) or a graph (.ply, COMPAS .json): its edges are "
+        help="of a mesh or a graph (.obj, .ply, .json of COMPAS, networkx or lists): its edges are "
         "the curves",
     )
     shell.add_argument(
@@ -240,6 +240,7 @@ def run(args: argparse.Namespace) -> int:
     from ..exchange.curve_files import CURVE_READERS, is_drawing, is_surface
     from ..exchange.other_formats import instead_of
     from ..files.files import check_output_file
+    from ..files.json_files import JSON_ENDINGS
     from ..geometry.mesh_files import MESH_SUFFIXES
     from ..structures.nets import net_class, net_classes
 
@@ -249,7 +250,16 @@ def run(args: argparse.Namespace) -> int:
     if not args.file.name.lower().endswith(tuple(known)):
         how = instead_of(args.file.name)
         raise InputError(f"can't be imported{how} (known: {', '.join(known)})", source=args.file)
-    for path in filter(None, (args.out, args.preview)):
+    for path, field, endings in (
+        (args.out, "--out", JSON_ENDINGS),
+        (args.preview, "--preview", (".html", ".htm")),
+    ):
+        if path is None:
+            continue
+        if not path.name.lower().endswith(endings):
+            raise InputError(
+                f"expected a name that ends in {' or '.join(endings)}", field=field, value=str(path)
+            )
         check_output_file(path, overwrite=args.overwrite)
     drawing = is_drawing(args.file)
     surface = args.kind is None and drawing and is_surface(args.file)

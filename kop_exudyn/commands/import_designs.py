@@ -101,7 +101,8 @@ def _content(args: argparse.Namespace) -> dict[str, Any]:
     from ..structures.base import foreign_format, format_names
     from ..units import Units
 
-    data = read_json(args.file) if args.patch is None and is_json_file(args.file) else None
+    read = args.patch is None and is_json_file(args.file)
+    data: Any = read_json(args.file) if read else None
     if data is not None and is_own(data):  # of any class, in any unit
         return _converted(args, data)
     if args.patch is not None:
@@ -114,7 +115,7 @@ def _content(args: argparse.Namespace) -> dict[str, Any]:
                 value=args.unit,
             )
         return _umbrella_on_mesh(args)
-    if data is None:
+    if not read:
         raise InputError("an umbrella mesh on a surface needs --patch", source=args.file)
     foreign = foreign_format(data)
     if foreign is None or foreign.rewrite is None:

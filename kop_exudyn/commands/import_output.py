@@ -43,5 +43,8 @@ def by_option(error: InputError) -> InputError:
         return error
     message = error.message
     if option == "--opening" and isinstance(error.value, float) and abs(error.value) > math.pi:
-        message = f"{message} (pi, in radians); {error.value:g} degrees are {error.value:g}deg"
+        given = math.degrees(error.value)
+        message = f"{message} (pi, in radians): it is {given:.4g} degrees"
+        if error.value > 2 * math.pi:
+            message += f"; if degrees are meant, write {error.value:g}deg"
     return InputError(message, source=error.source, field=option, value=error.value)

@@ -91,6 +91,13 @@ def read_scaled(
     space: bool = False,
 ) -> tuple[DrawnNetwork, Units | None]:
     """The network of a drawing in the design's units, see `scaled_reading` and `read_network`."""
+    if options.edges and options.layers:
+        raise InputError(
+            "edges are read of all that a file has: leave out --layer or --edges",
+            source=path,
+            field="--layer",
+            value=options.layers[0],
+        )
     drawing = edges_of(path) if options.edges else read_drawing(path, options.layers)
     options, units = scaled_reading(drawing, options, scale, units)
     try:

@@ -27,6 +27,7 @@ Edges = tuple[np.ndarray, list[tuple[int, int]]]
 # names under which JSON files list nodes, their places, edges and these ones' ends
 _NODES, _EDGES = ("nodes", "vertices", "points"), ("links", "edges", "lines")
 _PLACES = ("pos", "position", "xyz", "point", "coordinates")
+_SAME = 1e-6  # relative: what programs round places to
 _FROM_TO = (("source", "target"), ("u", "v"), ("start", "end"), ("from", "to"))
 
 
@@ -50,7 +51,11 @@ def edges_of(path: Path) -> Drawing:
     except InputError as error:
         raise error.at(path) from None
     if not pairs:
-        raise InputError("contains no faces, nor a graph, whose edges are laths", source=path)
+        raise InputError(
+            "contains no faces, nor a graph, whose edges are laths: leave out --edges where the "
+            "laths are drawn as lines",
+            source=path,
+        )
     if len(pairs) > MOST_CURVES:
         raise InputError(
             f"has {len(pairs):,} edges, at most {MOST_CURVES:,} are read as laths", source=path
@@ -93,7 +98,8 @@ def _of_json(content: bytes) -> Edges:
     try:
         found = list(_structures(json.loads(content.decode("utf-8-sig"))))
         if len(found) != 1:
-            raise InputError(f"expected one mesh or graph, found {len(found)}")
+            kinds = "of COMPAS, or lists of nodes and of edges or faces"
+            raise InputError(f"expected one mesh or graph ({kinds}), found {len(found)}")
         if _names_of_lists(found[0]) is not None:
             return _listed_edges(found[0])
         return _mesh_edges(found[0]) if "face" in found[0] else _graph_edges(found[0])
@@ -116,44 +122,72 @@ def _names_of_lists(data: Mapping[str, Any]) -> tuple[str, str] | None:
 def _listed_edges(data: Mapping[str, Any]) -> Edges:
     """Of lists of nodes and edges, or faces: of the node-link data of networkx, and alike."""
     of_nodes, of_edges = _names_of_lists(data) or ("", "")
-    nodes = data[of_nodes]
-    points = np.array([_place_of_node(node) for node in nodes]).reshape(-1, 3)
-    if not (np.abs(points) <= LARGEST).all():
-        raise InputError("has a node without finite coordinates")
-    numbers = {
-        _key(node.get("id", node.get("key", k)) if isinstance(node, Mapping) else k): k
-        for k, node in enumerate(nodes)
-    }
+    nodes, numbers = data[of_nodes], dict[str, int]()
+    points = np.zeros((len(nodes), 3))
+    for k, node in enumerate(nodes):
+        field = f"{of_nodes}[{k}]"
+        points[k] = _place_of_node(node, field)
+        given = node.get("id", node.get("key", k)) if isinstance(node, Mapping) else k
+        if _key(given) in numbers:
+            raise InputError(
+                f"has the id of {of_nodes}[{numbers[_key(given)]}]", field=field, value=given
+            )
+        numbers[_key(given)] = k
 
-    def number(of: Any) -> int:
+    def number(of: Any, field: str) -> int:
         if _key(of) not in numbers:
-            raise InputError("an edge ends at a node that isn't there", field=of_edges, value=of)
+            raise InputError("ends at a node that isn't there", field=field, value=of)
         return numbers[_key(of)]
 
-    chains = [[number(end) for end in _ends(edge)] for edge in data[of_edges]]
+    chains = []
+    for k, edge in enumerate(data[of_edges]):
+        field = f"{of_edges}[{k}]"
+        chains.append([number(end, field) for end in _ends(edge, field)])
     if of_edges == "faces":
         return points, _sides(chains)
     return points, sorted({(min(p), max(p)) for c in chains for p in zip(c, c[1:]) if p[0] != p[1]})
 
 
-def _place_of_node(node: Any) -> list[float]:
-    """Its coordinates, of two numbers in the plane z = 0."""
-    if isinstance(node, Mapping):
-        held = next((node[name] for name in _PLACES if name in node), node)
-        node = [held["x"], held["y"], held.get("z", 0.0)] if isinstance(held, Mapping) else held
-    if not 2 <= len(node) <= 3:
-        raise InputError("has a node without two or three coordinates", value=node)
-    return [*map(float, node), 0.0][:3]
+def _place_of_node(node: Any, field: str) -> np.ndarray:
+    """Its coordinates (3,), of two numbers in the plane z = 0. Raises InputError where it has none,
+    or several that differ: networkx keeps the places of a drawing beside its users' own."""
+    found = []
+    for held in _held(node):
+        if isinstance(held, Mapping):
+            held = [held[axis] for axis in "xyz" if axis in held]
+        if not isinstance(held, list) or not 2 <= len(held) <= 3:
+            continue
+        if all(type(x) in (int, float) and abs(x) <= LARGEST for x in held):
+            found.append(np.array([*map(float, held), 0.0][:3]))
+    if not found:
+        names = f"x, y and z, or {', '.join(_PLACES)}"
+        raise InputError(
+            f"expected a node with two or three finite coordinates ({names})",
+            field=field,
+            value=node,
+        )
+    if any(np.abs(place - found[0]).max() > _SAME * np.abs(found[0]).max() for place in found):
+        raise InputError("has places that differ: keep one of them", field=field, value=node)
+    return found[0]
 
 
-def _ends(edge: Any) -> Sequence[Any]:
+def _held(node: Any) -> list[Any]:
+    """What of a node may be its coordinates."""
+    if not isinstance(node, Mapping):
+        return [node]
+    return [node, *(node[name] for name in _PLACES if name in node)]
+
+
+def _ends(edge: Any, field: str) -> Sequence[Any]:
     """The nodes that an edge joins, one after the other."""
-    if not isinstance(edge, Mapping):
-        return list(edge)
-    for begin, end in _FROM_TO:
-        if begin in edge and end in edge:
-            return [edge[begin], edge[end]]
-    raise InputError("has an edge without source and target", value=dict(edge))
+    if isinstance(edge, list) and len(edge) > 1:
+        return edge
+    if isinstance(edge, Mapping):
+        for begin, end in _FROM_TO:
+            if begin in edge and end in edge:
+                return [edge[begin], edge[end]]
+    names = " or ".join(f"{begin} and {end}" for begin, end in _FROM_TO)
+    raise InputError(f"expected two nodes, or {names}", field=field, value=edge)
 
 
 def _mesh_edges(data: Mapping[str, Any]) -> Edges:
@@ -188,7 +222,9 @@ def _nodes(
 
 
 def _key(key: Any) -> str:
-    """A node's key; early versions wrote texts within texts."""
+    """A node's key; early versions wrote texts within texts, and tables whole numbers as 3.0."""
+    if isinstance(key, float) and key.is_integer():
+        key = int(key)
     return str(key).strip("'\"")
 
 

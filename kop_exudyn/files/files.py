@@ -82,16 +82,20 @@ def is_temporary(path: Path) -> bool:
 
 
 def write_text(path: str | Path, text: str, *, overwrite: bool = False) -> Path:
-    """`write_bytes` for text: UTF-8, line ends as they are. Raises InputError too for text with
+    """`write_bytes` for text: UTF-8, line ends as they are. Raises InputError too as `encoded`."""
+    return write_bytes(path, encoded(text, path), overwrite=overwrite)
+
+
+def encoded(text: str, path: str | Path) -> bytes:
+    """The text in UTF-8. Raises InputError naming the file that it is for, for text with
     surrogates, of file names that aren't UTF-8, say."""
     try:
-        content = text.encode()
+        return text.encode()
     except UnicodeEncodeError as error:
         raise InputError(
             f"can't be written: a text has {text[error.start]!r}, which is no character",
             source=path,
         ) from None
-    return write_bytes(path, content, overwrite=overwrite)
 
 
 def check_output_file(path: str | Path, *, overwrite: bool = False) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import math
 import re
@@ -12,7 +13,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from ..errors import InputError
-from .files import read_bytes, write_text
+from .files import encoded, read_bytes, write_bytes, write_text
 
 # Our documents are at most ten levels deep; this is short of what would exhaust Python's stack.
 MAX_DEPTH = 100
@@ -83,9 +84,13 @@ def parse_json(text: str, source: Any = None) -> Any:
 
 
 def write_json(path: str | Path, value: Any, *, overwrite: bool = False) -> Path:
-    """Write plain data, numpy's arrays and numbers included, as `to_json` does. Raises InputError
-    as `write_bytes`."""
-    return write_text(path, to_json(value), overwrite=overwrite)
+    """Write plain data, numpy's arrays and numbers included, as `to_json` does; compressed where
+    the name ends in .gz. Raises InputError as `write_text`."""
+    text = to_json(value)
+    if not str(path).lower().endswith(".gz"):
+        return write_text(path, text, overwrite=overwrite)
+    content = gzip.compress(encoded(text, path), mtime=0)  # the same data gives the same bytes
+    return write_bytes(path, content, overwrite=overwrite)
 
 
 def to_json(value: Any) -> str:

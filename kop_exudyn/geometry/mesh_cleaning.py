@@ -161,7 +161,12 @@ def _sense(faces: np.ndarray) -> np.ndarray:
 def triangles_of(polygons: Iterable[Sequence[int]], vertices: np.ndarray) -> np.ndarray:
     """(F, 3) triangles of polygons: convex quads are cut along their shorter diagonal, other convex
     polygons from their first corner, all others ear by ear."""
-    found = [t for polygon in polygons for t in _triangles(list(polygon), vertices)]
+    found: list[Sequence[int]] = []
+    for polygon in polygons:
+        if len(polygon) == 3 == len(set(polygon)):  # nearly all of them in large files
+            found.append(polygon)
+        else:
+            found += _triangles(list(polygon), vertices)
     return np.array(found, int).reshape(-1, 3)
 
 

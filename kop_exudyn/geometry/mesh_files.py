@@ -9,6 +9,7 @@ import os
 import re
 import struct
 from collections.abc import Callable, Iterator, Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -53,37 +54,50 @@ def read_mesh(
     if not os.path.isfile(path):
         raise InputError("no such file", field=field, value=str(path))
     try:
-        vertices, faces = _READERS[suffix](_content(path))
+        stat = os.stat(path)
+        vertices, faces, found = _read(
+            os.path.abspath(path), stat.st_mtime_ns, stat.st_size, tolerance
+        )
+    except InputError as error:
+        raise InputError(error.message, field=field, value=path.name) from None
+    for note in found:
+        log.info("%s: %s", path.name, note)
+    if notes is not None:
+        notes += found
+    return vertices.copy(), faces.copy()
+
+
+@lru_cache(maxsize=2)
+def _read(
+    path: str, changed: int, size: int, tolerance: float
+) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """The mesh in a file and what had to be cleaned; a file that is read again as it was isn't
+    parsed again.
+
+    changed, size : of the file, which tell whether it is as it was
+    """
+    try:
+        vertices, faces = _READERS[Path(path).suffix.lower()](_content(Path(path)))
     except InputError as error:
         place = f"{error.field}: " if error.field else ""
-        raise InputError(place + error.message, field=field, value=path.name) from None
+        raise InputError(place + error.message) from None
     except RecursionError:
-        raise InputError(
-            "is nested too deeply to be a mesh", field=field, value=path.name
-        ) from None
+        raise InputError("is nested too deeply to be a mesh") from None
     except Exception as error:  # the readers raise whatever the broken file leads them to
-        raise InputError(
-            f"can't be read as a mesh: {str(error)[:100]}", field=field, value=path.name
-        ) from None
+        raise InputError(f"can't be read as a mesh: {str(error)[:100]}") from None
     if vertices.ndim != 2 or vertices.shape[1] != 3 or not len(faces):
-        raise InputError("contains no faces", field=field, value=path.name)
+        raise InputError("contains no faces")
     if not np.isfinite(vertices).all():
-        raise InputError("contains no faces between finite vertices", field=field, value=path.name)
+        raise InputError("contains no faces between finite vertices")
     _check_count(len(faces))
     try:
         vertices, faces, found = cleaned(vertices, faces, tolerance)
     except InputError as error:
         at = "" if error.value is None else f" = {error.value}"
-        raise InputError(
-            f"{error.field}{at}: {error.message}", field=field, value=path.name
-        ) from None
+        raise InputError(f"{error.field}{at}: {error.message}") from None
     if not len(faces):
-        raise InputError("contains no faces with an area", field=field, value=path.name)
-    for note in found:
-        log.info("%s: %s", path.name, note)
-    if notes is not None:
-        notes += found
-    return vertices, faces
+        raise InputError("contains no faces with an area")
+    return vertices, faces, found
 
 
 def _content(path: Path) -> bytes:

@@ -8,7 +8,6 @@ surfaces applies; how far it lies from the mesh's vertices is measured, and limi
 
 from __future__ import annotations
 
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +34,7 @@ class MeshSurface(Surface):
         mesh must not overhang. "conformal": least-squares conformal map (Levy et al., SIGGRAPH
         2002), scaled to the mesh's area, centred, and turned so that u and v follow x and y best.
     Raises InputError for meshes that have no such chart and for such as the smooth surface can't
-    follow.
+    follow; `deviation` is its largest distance from the mesh's vertices at equal parameters.
     """
 
     def __init__(self, vertices: Any, faces: Any, chart: str = "plane", up: str = "z"):
@@ -48,30 +47,39 @@ class MeshSurface(Surface):
         flat = (
             _conformal(self.mesh) if chart == "conformal" else self.mesh.vertices[:, PLAN_AXES[up]]
         )
-        area = _signed_areas(flat, self.mesh.faces)
-        if not ((area > 0).all() or (area < 0).all()):
-            hint = (
-                '; take "chart": "conformal", at import --chart conformal with the curves drawn in '
-                "space on the surface"
-                if chart == "plane"
-                else ""
-            )
-            raise InputError(
-                "the mesh folds over in this chart" + hint, field="surface.chart", value=chart
-            )
+        self._check_chart(flat, chart, up)
         self._flat = TriangleSurface(np.column_stack([flat, np.zeros(len(flat))]), self.mesh.faces)
         self.lower, self.upper = flat.min(axis=0), flat.max(axis=0)
         self._fit(flat)
+
+    def _check_chart(self, flat: np.ndarray, chart: str, up: str) -> None:
+        """Raise _NoChart where parameters (V, 2) don't belong to one place of the mesh each."""
+        seen = f"seen along {up}" if chart == "plane" else "in its conformal chart"
+        area = _signed_areas(flat, self.mesh.faces)
+        turned = area <= 0 if (area > 0).sum() >= (area < 0).sum() else area >= 0
+        middles = self.mesh.vertices[self.mesh.faces].mean(axis=1)
+        if turned.any():
+            text = (
+                f"folds over, {seen}: {turned.sum():,} of its {len(area):,} triangles are upright "
+                "or turned over"
+            )
+            if chart == "plane" and is_disc(self.mesh):
+                text += (
+                    ' (a surface that overhangs needs "chart": "conformal", at import --chart '
+                    "conformal with the curves drawn in space on it)"
+                )
+            else:
+                text += ": give one sheet, without sides and other things"
+            raise _NoChart(text, middles[int(np.argmax(turned))])
+        twice = _covered_twice(flat, self.mesh.faces)
+        if twice is not None:
+            text = f"has two sheets above each other, {seen}: give one of them"
+            raise _NoChart(text, middles[twice])
 
     @property
     def flat(self) -> np.ndarray:
         """(V, 2) parameters of the mesh's vertices."""
         return self._flat.vertices[:, :2]
-
-    @cached_property
-    def deviation(self) -> float:
-        """Largest distance of the smooth surface from the mesh's vertices at equal parameters."""
-        return float(np.linalg.norm(self.points(self.flat) - self.mesh.vertices, axis=1).max())
 
     def parameters_of(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Parameters (n, 2) of the mesh's points nearest to points (n, 3), and their distances."""
@@ -127,12 +135,26 @@ class MeshSurface(Surface):
         matrix = rows.T @ rows + weight * sum(bend.T @ bend for bend in bends)
         solution = spsolve(sp.csc_array(matrix), rows.T @ self.mesh.vertices)
         self._coefficients = np.asarray(solution).reshape(n, m, 3)
+        off = np.linalg.norm(rows @ np.asarray(solution) - self.mesh.vertices, axis=1)
+        self.deviation = float(off.max())
         if not self.deviation <= _MAX_DEVIATION * self.mesh.size:
             raise InputError(
-                f"the mesh is too rough to be followed by a smooth surface (off by "
+                f"is too rough to be followed by a smooth surface (off by "
                 f"{100 * self.deviation / self.mesh.size:.1f} % of its size)",
                 field="surface",
             )
+
+
+class _NoChart(InputError):
+    """A mesh without a chart: for what reason, and place (3,) where that shows."""
+
+    def __init__(self, reason: str, place: np.ndarray):
+        super().__init__(f"the mesh {reason}", field="surface", value=_shown(place))
+        self.reason, self.place = reason, place
+
+
+def _shown(place: np.ndarray) -> str:
+    return f"({', '.join(f'{x:.6g}' for x in place)})"
 
 
 def load_mesh_surface(
@@ -143,9 +165,16 @@ def load_mesh_surface(
     origin: np.ndarray | float = 0.0,
 ) -> MeshSurface:
     """The surface of a mesh file, see `read_mesh`, its lengths times the scale, less an origin (3,)
-    in scaled lengths. Raises InputError naming the file."""
+    in scaled lengths. Raises InputError naming the file, and the place in its coordinates."""
     vertices, faces = read_mesh(path)
-    return MeshSurface(scale * vertices - origin, faces, chart, up)
+    try:
+        return MeshSurface(scale * vertices - origin, faces, chart, up)
+    except _NoChart as error:
+        place = _shown((error.place + origin) / scale)
+        message = f"near {place} it {error.reason}"
+        raise InputError(message, field="surface.file", value=path.name) from None
+    except InputError as error:
+        raise InputError(error.message, field="surface.file", value=path.name) from None
 
 
 def is_disc(mesh: TriangleSurface) -> bool:
@@ -186,6 +215,17 @@ def _second_difference(n: int) -> sp.sparray:
 def _signed_areas(flat: np.ndarray, faces: np.ndarray) -> np.ndarray:
     a, b, c = (flat[faces[:, k]] for k in range(3))
     return 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+
+
+def _covered_twice(flat: np.ndarray, faces: np.ndarray) -> int | None:
+    """A face whose middle lies in another face as well, in the plane; None where there is none."""
+    import shapely
+
+    corners = flat[faces]
+    tree = shapely.STRtree(shapely.polygons(corners))
+    points, found = tree.query(shapely.points(corners.mean(axis=1)), predicate="within")
+    other = points[points != found]
+    return int(other[0]) if len(other) else None
 
 
 def _conformal(mesh: TriangleSurface) -> np.ndarray:

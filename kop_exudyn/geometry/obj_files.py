@@ -189,7 +189,9 @@ def _index(text: str, n_vertices: int, place: str) -> int:
     """The vertex that an element names: from 1, or from -1 backwards; what follows a slash is its
     texture and its normal. Programs that hold all in one array of numbers write 3 as 3.0."""
     try:
-        number = int(_WHOLE_AS_FRACTION.sub("", text.split("/")[0]))
+        number = (
+            int(text) if text.isdecimal() else int(_WHOLE_AS_FRACTION.sub("", text.split("/")[0]))
+        )
     except ValueError:
         raise InputError("expected numbers of vertices", field=place, value=text) from None
     if not 1 <= abs(number) <= n_vertices:

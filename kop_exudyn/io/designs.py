@@ -68,14 +68,19 @@ def own_content(path: str | Path) -> dict[str, Any]:
 def load_all(files: Iterable[Path], source: str | Path) -> list[Design]:
     """The designs of these files; InputError, naming the source, when two have the same name or
     different units."""
+    files = list(files)
     designs = [load_design(path) for path in files]
-    seen: dict[str, Design] = {}
-    for design in designs:
+    seen: dict[str, Path] = {}
+    for design, path in zip(designs, files):
         if design.name in seen:
             raise InputError(
-                "two designs have the same name", source=source, field="name", value=design.name
+                f"{seen[design.name].name} and {path.name} have the same name: results and files "
+                "are told apart by it, so give one of them another",
+                source=source,
+                field="name",
+                value=design.name,
             )
-        seen[design.name] = design
+        seen[design.name] = path
     units = {design.name: design.units for design in designs}
     try:
         common_units(units)

@@ -29,11 +29,27 @@ def save_rescaled(files: Sequence[Path], scales: Sequence[float], folder: str | 
             content.append(rescaled(data, scale) if scale != 1 else dict(data))
         except InputError as error:
             raise error.at(file) from None
+    check_rescaled(files, folder)
     made = make_folder(folder)
     return [
-        write_json(made / file.name.removesuffix(".gz"), relocated(data, file.parent, made))
+        write_json(_new_file(file, made), relocated(data, file.parent, made))
         for file, data in zip(files, content)
     ]
+
+
+def check_rescaled(files: Sequence[Path], folder: str | Path) -> None:
+    """Raise InputError unless `save_rescaled` can write all of these to the folder, before any work
+    is done for it."""
+    if os.path.exists(folder) and not os.path.isdir(folder):
+        raise InputError("is a file, expected a folder to write to", source=folder)
+    for file in files:
+        path = _new_file(file, Path(folder))
+        if os.path.exists(path):
+            raise InputError("exists already: take another folder", source=path)
+
+
+def _new_file(file: Path, folder: Path) -> Path:
+    return folder / file.name.removesuffix(".gz")
 
 
 def relocated(value: Any, old: Path, new: Path) -> Any:

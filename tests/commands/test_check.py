@@ -27,8 +27,8 @@ def test_a_design_alone_is_not_compared_with_others(repository, capsys):
 @pytest.mark.parametrize(
     "more, message",
     [
-        (("--harmonise", "0.9,1.1"), "give it with --out"),
-        (("--out", "x"), "give it with --out"),
+        (("--harmonise", "0.9,1.1"), "--out: names the folder that --harmonise writes to"),
+        (("--out", "x"), "--harmonise: is for rescaled designs"),
         (("--harmonise", "1.1,1.2", "--out", "x"), "expected two factors"),
         (("--parts", "linear=900"), "more parts than elements"),
         (("--parts", "cell=2"), "no elements of this kind"),
@@ -38,3 +38,18 @@ def test_what_makes_no_sense(more, message, repository, capsys):
     models = repository / "models" / "small"
     assert status_of("check", models, "--designs", "1", *more) == 2
     assert message in capsys.readouterr().err
+
+
+def test_nothing_is_written_beside_what_is_there(repository, tmp_path, capsys, monkeypatch):
+    """The first design was written, after all the work, and then the second one refused."""
+    worked = []
+    monkeypatch.setattr("kop_exudyn.analysis.input_check.simulate", worked.append)
+    arguments = ("check", repository / "models" / "small", "--designs", "2")
+    arguments += ("--harmonise", "0.9,1.1", "--out")
+    (tmp_path / "03_exp.json").write_text("mine")
+    assert status_of(*arguments, tmp_path) == 2
+    said = capsys.readouterr().err
+    assert "03_exp.json: exists already: take another folder" in said
+    assert [path.name for path in tmp_path.iterdir()] == ["03_exp.json"]
+    assert status_of(*arguments, tmp_path / "03_exp.json") == 2
+    assert "is a file, expected a folder" in capsys.readouterr().err and not worked

@@ -341,15 +341,33 @@ case("faces_of_lists.json", _EDGES)(
 )
 case(
     "edges_to_nowhere.json",
-    Refused("edges = 2: an edge ends at a node that isn't", {"edges": True}),
+    Refused("edges[0] = 2: ends at a node that isn't", {"edges": True}),
 )(lambda: json.dumps({"nodes": [[0, 0], [1, 0]], "edges": [[0, 2]]}))
-case(
-    "nodes_without_places.json", Refused("can't be read as a mesh or graph: 'x'", {"edges": True})
-)(lambda: json.dumps({"nodes": [{"id": 0}, {"id": 1}], "links": [{"source": 0, "target": 1}]}))
-case("edges_without_ends.json", Refused("an edge without source and target", {"edges": True}))(
+case("nodes_without_places.json", Refused("nodes[0]", {"edges": True}))(
+    lambda: json.dumps({"nodes": [{"id": 0}, {"id": 1}], "links": [{"source": 0, "target": 1}]})
+)
+case("edges_without_ends.json", Refused("expected two nodes, or source", {"edges": True}))(
     lambda: json.dumps({"nodes": [[0, 0], [1, 0]], "links": [{"a": 0, "b": 1}]})
 )
-case("edges_of_points.json", Refused("expected one mesh or graph, found 0", {"edges": True}))(
+
+
+def _two_nets(**of_first: Any) -> str:
+    """Two networks in one list, each with ids of its own from 0; or one with more of node 0."""
+    nodes = [{"id": k, "pos": [k % 4, k // 4]} | (of_first if k == 0 else {}) for k in range(12)]
+    more = [{"id": k, "pos": [10 + k % 4, k // 4]} for k in range(12)]
+    links = [{"source": a, "target": b} for a, b in _pairs()]
+    if of_first:
+        return json.dumps({"nodes": nodes, "links": links})
+    return json.dumps({"nodes": nodes + more, "links": links + links})
+
+
+case("nodes_of_one_id.json", Refused("nodes[12] = 0: has the id of nodes[0]", {"edges": True}))(
+    _two_nets
+)
+case("node_at_two_places.json", Refused("has places that differ", {"edges": True}))(
+    lambda: _two_nets(x=3000, y=0, z=900)
+)
+case("edges_of_points.json", Refused("expected one mesh or graph (of COMPAS", {"edges": True}))(
     lambda: json.dumps({"dtype": "compas.geometry/Point", "data": [0, 0, 0]})
 )
 case("edges_that_reach_nothing.json", Refused("can't be read as a mesh or graph", {"edges": True}))(

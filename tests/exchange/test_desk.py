@@ -218,6 +218,7 @@ def test_a_design_alone_with_its_loaded_state(shells, tmp_path):
     assert files == {f"first_{state}.vtu" for state in ("deployed", "rest", "loaded")} | {
         "first.3dm",
         "first_rods.csv",
+        "READ_ME.txt",
     }
     rows = read(tmp_path / "first_rods.csv")
     assert {row["state"] for row in rows} == {"deployed", "rest", "loaded"}

@@ -94,13 +94,16 @@ class TestCommand:
             ((*OPTIONS, "--as", "umbrella"), "an umbrella mesh on a surface needs --patch"),
             ((*OPTIONS, "--material", "1,0.7"), "--material = 0.7: "),
             ((*OPTIONS, "--opening", "9"), "--opening = 9.0: must be smaller than 3.14159"),
-            ((*OPTIONS, "--opening", "35"), "35 degrees are 35deg"),
+            ((*OPTIONS, "--opening", "35"), "if degrees are meant, write 35deg"),
             ((*OPTIONS[2:], "--as", "grid", "--held", "edge"), "a grid needs --surface"),
             (
                 (*OPTIONS, "--opening", "wide"),
                 "expected an angle in radians, or as 35deg, got 'wide'",
             ),
             ((*OPTIONS, "--scale", "0"), "expected a positive number"),
+            ((*OPTIONS, "--edges", "--layer", "laths"), "--layer = 'laths': edges are read of all"),
+            (("--preview", "p.pdf"), "--preview = 'p.pdf': expected a name that ends in .html"),
+            (("--out", "net.txt"), "expected a name that ends in .json or .json.gz"),
             ((*OPTIONS, "--section", "3"), "expected two numbers"),
         ],
     )

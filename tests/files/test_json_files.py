@@ -1,5 +1,6 @@
 """JSON as other programs write and read it."""
 
+import gzip
 import json
 import math
 
@@ -91,3 +92,11 @@ def test_an_archive_that_unpacks_to_very_much_is_not_read(tmp_path, monkeypatch)
     path.write_bytes(gzip.compress(b"[" + b"0," * 100_000 + b"0]"))
     with pytest.raises(InputError, match="larger than"):
         json_files.read_json(path)
+
+
+def test_a_name_that_says_so_gives_a_compressed_file(tmp_path):
+    """It was written as text under the name, which no other program reads."""
+    data = {"a": [1.5, 2.5], "b": "ü"}
+    path = write_json(tmp_path / "a.json.gz", data)
+    assert json.loads(gzip.decompress(path.read_bytes())) == read_json(path) == data
+    assert write_json(tmp_path / "b.json.gz", data).read_bytes() == path.read_bytes()

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from kop_exudyn.errors import InputError
+from kop_exudyn.exchange.polygons import write_mesh_obj
 from kop_exudyn.geometry.mesh_surface import MeshSurface, load_mesh_surface
 from kop_exudyn.geometry.surface_tracing import Domain, asymptotic_line, curvature_line, geodesic
 from kop_exudyn.geometry.surfaces import FAMILIES, AnalyticSurface
@@ -235,3 +236,25 @@ def test_asymptotic_lines_end_where_the_curvature_changes_sign():
     torus = surface("torus")
     line = asymptotic_line(Domain(torus, [-1, 0], [1, np.pi]), [0.0, 2.5], 0)
     assert line[:, 1].min() > np.pi / 2 - 1e-3 and (torus.at(line).gauss < 1e-3).all()
+
+
+def test_sheets_above_each_other_are_refused():
+    """The surface went between them, where nothing is drawn."""
+    vertices, faces = bumpy_mesh()
+    both = np.concatenate([vertices, vertices - [0, 0, 0.02]])
+    with pytest.raises(InputError, match="two sheets above each other, seen along z"):
+        MeshSurface(both, np.concatenate([faces, faces + len(vertices)]))
+    beside = np.concatenate([vertices, vertices + [3.0, 0, 0]])  # which hides nothing
+    assert MeshSurface(beside, np.concatenate([faces, faces + len(vertices)])).contains([[0, 0]])
+
+
+def test_what_is_no_sheet_is_named_with_its_place(tmp_path):
+    vertices, faces = bumpy_mesh()
+    side = np.concatenate([vertices, [[0.0, 0.0, 5.0], [0.1, 0.0, 5.0], [0.0, 0.0, 6.0]]])
+    n = len(vertices)
+    write_mesh_obj(tmp_path / "fin.obj", side + 100.0, np.concatenate([faces, [[n, n + 1, n + 2]]]))
+    with pytest.raises(InputError) as caught:
+        load_mesh_surface(tmp_path / "fin.obj", scale=2.0, origin=np.full(3, 50.0))
+    said = str(caught.value)
+    assert "surface.file = 'fin.obj'" in said and "near (100.033, 100, 105.333)" in said
+    assert "1 of its" in said and "without sides" in said and "conformal" not in said

@@ -304,7 +304,9 @@ def test_impossible_selections(folder, select, message):
 
 def test_same_name_twice(folder, write_json_file):
     write_json_file("set/twin.json", design_data("Shape 1"))
-    with pytest.raises(InputError, match="two designs have the same name"):
+    with pytest.raises(
+        InputError, match="have the same name: results and files are told apart by it"
+    ):
         load_designs(folder)
 
 

@@ -130,3 +130,29 @@ def test_lengths_and_angles_of_a_fitted_grid_replace_those_of_its_curves(reposit
     refused(r"straightened.lengths.*have \d+ lengths", lengths=values["lengths"][1:])
     refused(r"straightened.angles.*have \d+ angles", angles=[*values["angles"], 0.0])
     refused(r"must be positive", lengths=[-0.1, *values["lengths"][1:]])
+
+
+def test_ends_beyond_the_last_joint_may_overhang_the_surface(write_json_file, tmp_path):
+    """They are left out of the grid; only what is built has to lie on the roof."""
+    t = np.linspace(0.0, 2.0, 9)
+    x, y = (values.ravel() for values in np.meshgrid(t, t, indexing="ij"))
+    rows = [f"v {a} {b} {0.2 * a * b}" for a, b in zip(x, y)]
+    faces = [(9 * i + j + 1, 9 * i + j + 10, 9 * i + j + 11) for i in range(8) for j in range(8)]
+    rows += [f"f {a} {b} {c}\nf {a} {c} {c - 9}" for a, b, c in faces]
+    (tmp_path / "roof.obj").write_text("\n".join(rows))
+
+    def laths(over: float, first: float) -> dict:
+        ends = [[[-over, k], [2 + over, k]] for k in (first, 1.0, 1.9)]
+        both = [*ends, *([p[::-1] for p in pair] for pair in ends)]
+        return {"type": "curves", "curves": [{"type": "polyline", "points": p} for p in both]}
+
+    surface = {"type": "mesh", "file": "roof.obj"}
+
+    def grid(network: dict) -> dict:
+        return {**SADDLE, "surface": surface, "network": network}
+
+    over = load_design(write_json_file("over.json", grid(laths(0.3, 0.1))))
+    flush = load_design(write_json_file("flush.json", grid(laths(0.0, 0.1))))
+    np.testing.assert_allclose(over.parameters, flush.parameters, atol=1e-9)
+    with pytest.raises(InputError, match="leaves the surface"):
+        load_design(write_json_file("off.json", grid(laths(0.3, -0.1))))

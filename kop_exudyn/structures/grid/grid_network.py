@@ -34,9 +34,12 @@ def network_on(surface: Surface, data: Mapping[str, Any]) -> CurveNetwork:
             field="network.type",
             value=data["type"],
         )
-    curves = _READERS[data["type"]](surface, data)
-    for curve in curves:
-        samples = curve.position(np.union1d(curve.stations, np.linspace(0, curve.length, _SAMPLES)))
+    found = network(_READERS[data["type"]](surface, data))
+    for strand in found.strands:  # ends beyond the last joints are left out, wherever they reach
+        curve, (first, last) = strand.curve, strand.stations[[0, -1]]
+        first, last = (0.0, curve.length) if strand.closed else (first, last)
+        own = curve.stations[(curve.stations > first) & (curve.stations < last)]
+        samples = curve.position(np.union1d(own, np.linspace(first, last, _SAMPLES)))
         inside = surface.contains(samples)
         if not inside.all():
             raise InputError(
@@ -44,7 +47,7 @@ def network_on(surface: Surface, data: Mapping[str, Any]) -> CurveNetwork:
                 field=curve.field,
                 value=samples[int(np.argmin(inside))].tolist(),
             )
-    return network(curves)
+    return found
 
 
 def _isolines(surface: Surface, data: Mapping[str, Any]) -> list[Curve]:
