@@ -87,7 +87,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--tolerance",
         type=number_pair,
         metavar="MM,DEG",
-        help="how exactly lengths and angles should be cut (default: 0.5,0.5)",
+        help="how exactly lengths and angles should be cut (default: 2.5 standard deviations of "
+        "the errors that the designs were tried with, else 0.5,0.5)",
     )
     shop.add_argument(
         "--paper", choices=("a4", "a3"), default="a3", help="of workshop.pdf (default: %(default)s)"
@@ -121,11 +122,18 @@ def _kit(args: argparse.Namespace) -> tuple[list[Path], list[str]]:
             source=args.what,
             field="FOLDER",
         )
-    tolerances = Tolerances(*args.tolerance) if args.tolerance else Tolerances()
     result = load_run(args.what, load_designs(args.folder))
     unit, parts = _unit(args, result.units), parts_list_of(result)
     options = _options(args, usual_options(result.designs))
     blanks = Blanks(parts, unit, options) if args.only != "desk" else None
+    tried = Tolerances.tried(result.buildable, unit)
+    tolerances = Tolerances(*args.tolerance) if args.tolerance else tried or Tolerances()
+    if tried and (tolerances.length > tried.length or tolerances.angle > tried.angle):
+        log.warning(
+            "the designs were tried with smaller errors: %g mm and %g degrees hold nearly all",
+            tried.length,
+            tried.angle,
+        )
     found = obstacles(result, blanks)
     note = "" if blanks is None else sources(blanks).note
     if not args.force:
@@ -142,6 +150,7 @@ def _kit(args: argparse.Namespace) -> tuple[list[Path], list[str]]:
             tolerances=tolerances,
             paper=args.paper,
             title=f"Kit of {counted(len(parts.designs), 'design')}: {args.what.resolve().name}",
+            warnings=found,
             force=args.force,
             overwrite=args.overwrite,
         )
@@ -156,6 +165,21 @@ def _design(args: argparse.Namespace) -> list[Path]:
     from ..exchange.export import export_simulation
     from ..io.designs import load_design
 
+    for name in (
+        "sheet",
+        "stock",
+        "kerf",
+        "gap",
+        "clearance",
+        "joint_hole",
+        "bolt_hole",
+        "tolerance",
+    ):
+        if getattr(args, name) is not None:
+            raise InputError(
+                "is for a kit's workshop folder: a design alone has no parts to cut",
+                field=f"--{name.replace('_', '-')}",
+            )
     if args.folder is not None or args.only == "workshop":
         raise InputError(
             "a design alone has no parts to cut: find a kit first (kop optimize)",

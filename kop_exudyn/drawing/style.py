@@ -30,7 +30,7 @@ PALETTE = {
 }
 CYCLE = tuple(PALETTE.values())
 # text and main lines; axes and notes; what is compared with
-INK, QUIET, FAINT = "#222222", "#6b6b6b", "#c9c9c9"
+INK, QUIET, FAINT, WARNING = "#222222", "#6b6b6b", "#c9c9c9", "#b3261e"
 
 # The formulas in our own labels, and those of matplotlib's logarithmic axes.
 _FORMULA = re.compile(r"\$(w_c|10\^\{-?\d+\}|\\mathdefault\{[^$]*\})\$")

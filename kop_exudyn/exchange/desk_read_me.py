@@ -22,7 +22,8 @@ _FILES = {
     r".*\.3dm": "all states of the design for Rhino: centre lines and solids, on layers by part",
     r".*\.compas\.json": "graph and mesh of the state for COMPAS 2: json_load gives both",
     r".*\.glb": "solids coloured by part, with the target, in metres and y up as glTF asks: for "
-    "Blender, Rhino, web pages",
+    "Blender, Rhino, web pages. Designs far from the origin are moved to it, all states of one "
+    "alike: the node origin says from where (origin_metres)",
     r".*\.obj": "centre lines of the state, one named group an element (part and number)",
     r".*\.ply": "solids of the state, coloured by part, in the designs' unit",
     r".*\.vtu": "centre lines with strains, forces, moments, stresses and deviations as fields, "

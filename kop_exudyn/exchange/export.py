@@ -19,7 +19,7 @@ from ..units import Units
 from ..wording import counted
 from .compas_json import write_compas
 from .desk_read_me import desk_read_me
-from .gltf import write_glb
+from .gltf import common_origin, write_glb
 from .meshes import sweep
 from .polygons import write_mesh_obj, write_obj, write_ply
 from .result_tables import part_rows, result_tables, rod_rows
@@ -124,13 +124,14 @@ def _write_states(
     labels = () if parts is None else all_labels(parts)
     units = states[0].design.units
     unit = None if units is None else units.length
+    origin = common_origin(states)
     writers: dict[str, Callable[[Path, DesignState], Path]] = {
         "obj": lambda path, state: write_obj(
             path, state.lines, state.names, unit=unit, overwrite=overwrite
         ),
         "ply": lambda path, state: _write_ply(path, state, overwrite),
         "vtu": lambda path, state: write_vtu(path, state, labels, overwrite=overwrite),
-        "glb": lambda path, state: write_glb(path, [state], overwrite=overwrite),
+        "glb": lambda path, state: write_glb(path, [state], origin=origin, overwrite=overwrite),
         "compas": lambda path, state: write_compas(path, state, overwrite=overwrite),
     }
     endings = {"compas": "compas.json"}

@@ -24,16 +24,19 @@ _FAR = 100.0  # sizes from the origin beyond which a state is moved to it
 _TARGET_COLOUR = (0.55, 0.6, 0.65, 0.35)
 
 
-def glb_bytes(states: Sequence[DesignState], *, target: bool = True) -> bytes:
+def glb_bytes(
+    states: Sequence[DesignState], *, target: bool = True, origin: np.ndarray | None = None
+) -> bytes:
     """The states as a GLB file.
 
     target : whether the target surface of those that have one goes with them
+    origin : (3,) what is taken off all coordinates; default: see `common_origin`
     """
     import trimesh
     from trimesh.visual import TextureVisuals
     from trimesh.visual.material import PBRMaterial
 
-    centre = _origin(states)
+    centre = common_origin(states) if origin is None else origin
     scene = trimesh.Scene(base_frame="y up, metres")
     metres = states[0].metres
     root = _Y_UP @ np.diag([metres, metres, metres, 1.0])
@@ -88,13 +91,21 @@ def glb_bytes(states: Sequence[DesignState], *, target: bool = True) -> bytes:
     return scene.export(file_type="glb")
 
 
-def write_glb(path: str | Path, states: Sequence[DesignState], *, overwrite: bool = False) -> Path:
-    """Write states. Raises InputError when the file exists or can't be written."""
-    return write_bytes(path, glb_bytes(states), overwrite=overwrite)
+def write_glb(
+    path: str | Path,
+    states: Sequence[DesignState],
+    *,
+    origin: np.ndarray | None = None,
+    overwrite: bool = False,
+) -> Path:
+    """Write states; origin : see `glb_bytes`. Raises InputError when the file exists or can't be
+    written."""
+    return write_bytes(path, glb_bytes(states, origin=origin), overwrite=overwrite)
 
 
-def _origin(states: Sequence[DesignState]) -> np.ndarray:
-    """What is taken off all coordinates: nothing, for states near the origin."""
+def common_origin(states: Sequence[DesignState]) -> np.ndarray:
+    """(3,) what is taken off all coordinates, so that files of one state each lie right beside each
+    other: nothing, for states near the origin."""
     points = np.concatenate([state.points for state in states])
     middle, size = points.mean(axis=0), float(np.linalg.norm(np.ptp(points, axis=0)))
     far = np.linalg.norm(middle) > _FAR * size

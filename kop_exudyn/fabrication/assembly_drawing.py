@@ -197,7 +197,8 @@ class AssemblyDrawing:
         """Draw on axes in mm of paper.
 
         origin : where the drawing's (0, 0) lies on paper
-        window (2, 2) : outside of which nothing is drawn; None: everything, without labels
+        window (2, 2) : outside of which nothing is drawn; None: everything, with no labels but
+            the lamellas' numbers
         """
         shades = kit_colours(self.parts.kit.sizes)
         pieces = self.placed.chain_pieces
@@ -221,6 +222,8 @@ class AssemblyDrawing:
                 _add(ax, gaps, "white", _ROD * 2.6, clip)
             _add(ax, lines, colours, _ROD if window is not None else 0.8, clip)
         if window is None:
+            for label in self._lamella_labels(scale):
+                _write(ax, label, origin + label.places[0])
             return
         joints = origin + self.joints / scale
         inside = np.all((joints > window[0]) & (joints < window[1]), axis=1)
@@ -230,23 +233,8 @@ class AssemblyDrawing:
         ax.plot(*corners[inside].T, ls="", marker="D", ms=2.0, color=INK, zorder=4)
         labels, places, _ = self.labels(scale)
         for label, at in zip(labels, places):
-            x, y = origin + at
-            if np.all(([x, y] > window[0] + 1) & ([x, y] < window[1] - 1)):
-                ax.text(
-                    x,
-                    y,
-                    label.text,
-                    size=label.size,
-                    rotation=label.angle,
-                    color=label.colour,
-                    weight=label.weight,
-                    ha="center",
-                    va="center" if "\n" in label.text else "center_baseline",
-                    rotation_mode="anchor",
-                    linespacing=1.15,
-                    zorder=5,
-                    parse_math=False,
-                )
+            if np.all((origin + at > window[0] + 1) & (origin + at < window[1] - 1)):
+                _write(ax, label, origin + at)
 
     def _draw_cells(
         self, ax: Axes, scale: float, origin: np.ndarray, clip: Any, shades: Mapping[str, Any]
@@ -269,6 +257,23 @@ class AssemblyDrawing:
                 step = line[-1] - line[0]
                 step = step / (np.linalg.norm(step) or 1.0) * (1 if end == 0 else -1)
                 yield np.array([line[end], line[end] + _GAP * step])
+
+
+def _write(ax: Axes, label: Label, at: np.ndarray) -> None:
+    ax.text(
+        *at,
+        label.text,
+        size=label.size,
+        rotation=label.angle,
+        color=label.colour,
+        weight=label.weight,
+        ha="center",
+        va="center" if "\n" in label.text else "center_baseline",
+        rotation_mode="anchor",
+        linespacing=1.15,
+        zorder=5,
+        parse_math=False,
+    )
 
 
 def _add(ax: Axes, lines: Sequence[np.ndarray], colours: Any, width: float, clip: Any) -> None:

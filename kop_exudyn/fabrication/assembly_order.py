@@ -102,7 +102,7 @@ def fasteners(blanks: Blanks) -> list[dict[str, Any]]:
             row = {
                 "item": f"bolt with nut, {item}s",
                 "diameter_mm": diameter,
-                "clamps_mm": clamped,
+                "clamps_mm": round(clamped, 2),
                 "length_mm": round(clamped + 2 * _SPARE * diameter, 1),
                 "pieces": max(numbers.values()),
             }

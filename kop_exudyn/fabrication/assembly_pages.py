@@ -136,10 +136,15 @@ def explanation(placed: PlacedPieces) -> str:
     if not any(part_kind(kind).angular for kind in kinds):
         return text
     if not stands_on_edge(placed):
-        return f"{text} · diamonds: corners (·f: flipped, turned over)"
+        return (
+            f"{text} · seen from above\n"
+            "diamonds: corner plates; walking along the lamella from its number: label up, right "
+            "of the axis, it turns left (·f: flipped, label down, left of the axis, it turns right)"
+        )
     return (
-        f"{text}\ndiamonds: corners, bent so that the lamella rises towards you at its ends (·f: "
-        "flipped, it falls away)"
+        f"{text} · seen from above\n"
+        "diamonds: corner plates, label in their lower half: the lamella rises towards you at its "
+        "ends (·f: flipped, label in the upper half, it falls away)"
     )
 
 

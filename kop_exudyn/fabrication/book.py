@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ..kit.kinds import part_kind
 from .assembly import joint_places, joint_table
 from .assembly_drawing import AssemblyDrawing
@@ -10,7 +12,7 @@ from .assembly_pages import assembly_pages
 from .blanks import Blanks
 from .cutlist import cut_list, material
 from .cutsheets import Sheet
-from .options import Tolerances, tenths
+from .options import UNFIT, Tolerances, tenths
 from .paper import Book
 from .part_pages import cell_pages, plate_pages, sheet_pages, stock_pages, strip_pages
 from .sources import EITHER, sources
@@ -30,7 +32,7 @@ _ELSEWHERE = (
 )
 _ENDS = (
     "Of a lamella's first and last piece one side is used. The other one stands out beyond the "
-    "last joint and carries nothing:\nit may be sawn off behind the joint where it is in the way "
+    "last joint and carries nothing: it may be sawn off behind the joint where it is in the way "
     "and no other design needs the whole piece."
 )
 
@@ -49,16 +51,19 @@ def workshop_book(
     paper: str = "a3",
     title: str = "Kit of parts",
     tolerances: Tolerances = Tolerances(),
+    warnings: Sequence[str] = (),
 ) -> Book:
     """Cut list, parts, bars, sheets, then of every design its steps, joints and drawing.
 
     paper : "a4" or "a3"
+    warnings : what stops the kit from being built, in sentences
     Raises InputError for another paper.
     """
-    book = Book(paper, title)
+    book = Book(paper, title, f"{UNFIT}, see page 1" if warnings else "")
     rows = cut_list(blanks, tolerances)
     kept = [{name: value for name, value in row.items() if name not in _ELSEWHERE} for row in rows]
-    book.table("Cut list", kept, _note(blanks, tolerances))
+    unfit = [f"{UNFIT}: {'; '.join(warnings)}."] if warnings else []
+    book.table("Cut list", kept, "\n".join([*unfit, _note(blanks, tolerances)]))
     bought = [*material(blanks, sheets, plan), *fasteners(blanks)]
     book.table("Material and fasteners", bought)
     strip_pages(book, blanks)
@@ -84,7 +89,7 @@ def _note(blanks: Blanks, tolerances: Tolerances) -> str:
     angles = f", angles to {tolerances.angle:g} degrees" if any(k.angular for k in kinds) else ""
     lines = [
         "Pieces serve the designs one after the other: as many as the neediest uses. "
-        f"Keep {lengths}{angles}."
+        f"Keep {lengths}{angles}{f' ({tolerances.why})' if tolerances.why else ''}."
     ]
     if blanks.strips:
         board = blanks.board

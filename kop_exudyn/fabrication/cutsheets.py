@@ -38,28 +38,29 @@ class Sheet:
     thickness: float = 0.0
 
 
-def cut_sheets(blanks: Blanks, *, force: bool = False) -> list[Sheet]:
+def cut_sheets(blanks: Blanks, *, force: bool = False, warning: str = "") -> list[Sheet]:
     """All pieces that the kit's neediest designs use, on as many sheets as they take; those of one
     thickness together. Straight pieces that only bars hold are left out (see `sources`).
 
     force : leave out, too, what no sheet holds
+    warning : stands on every sheet, below its pieces
 
     Raises InputError where a piece is larger than a sheet; see also `templates`.
     """
     wanted = _wanted(blanks, force)
-    return lay_out(wanted, [t.count for t in wanted], "cut sheet", blanks.options)
+    return lay_out(wanted, [t.count for t in wanted], "cut sheet", blanks.options, warning)
 
 
-def template_sheets(blanks: Blanks, *, force: bool = False) -> list[Sheet]:
+def template_sheets(blanks: Blanks, *, force: bool = False, warning: str = "") -> list[Sheet]:
     """One piece of every part, with its dimensions: templates to check with, or to copy by hand.
 
-    force : as of `cut_sheets`
+    force, warning : as of `cut_sheets`
     """
     wanted = _wanted(blanks, force)
     captioned = [
         Template(t.label, t.name, t.count, (*t.shapes, _caption(t)), t.thickness) for t in wanted
     ]
-    return lay_out(captioned, [1] * len(wanted), "templates", blanks.options)
+    return lay_out(captioned, [1] * len(wanted), "templates", blanks.options, warning)
 
 
 def _wanted(blanks: Blanks, force: bool) -> list[Template]:
@@ -70,9 +71,15 @@ def _wanted(blanks: Blanks, force: bool) -> list[Template]:
 
 
 def lay_out(
-    wanted: Sequence[Template], copies: Sequence[int], title: str, options: CutOptions
+    wanted: Sequence[Template],
+    copies: Sequence[int],
+    title: str,
+    options: CutOptions,
+    warning: str = "",
 ) -> list[Sheet]:
     """Pieces on sheets, `copies` of each template.
+
+    title : what sheets are called, by numbers; warning : stands below their pieces
 
     Raises InputError where a piece is larger than a sheet.
     """
@@ -91,7 +98,7 @@ def lay_out(
         pieces = [wanted[k] for k in numbers for _ in range(copies[k])]
         found += [(thickness, on_it) for on_it in _packed(pieces, width, height, options.apart)]
     return [
-        _sheet(on_it, f"{title} {number} of {len(found)}", thickness, options)
+        _sheet(on_it, f"{title} {number} of {len(found)}", thickness, options, warning)
         for number, (thickness, on_it) in enumerate(found, 1)
     ]
 
@@ -126,6 +133,7 @@ def _sheet(
     title: str,
     thickness: float,
     options: CutOptions,
+    warning: str,
 ) -> Sheet:
     width, height = options.sheet
     shapes: list[Shape] = [rectangle(0.0, 0.0, width, height, NOTES)]
@@ -135,7 +143,8 @@ def _sheet(
         by = corner + [x, y] - template.box[0]
         shapes += [shape.moved(by) for shape in template.shapes]
         labels[template.label] = labels.get(template.label, 0) + 1
-    note = f"{title}, material {thickness:g} mm thick, all lengths in mm; this line is "
+    note = f"{warning}: {title}" if warning else title
+    note += f", material {thickness:g} mm thick, all lengths in mm; this line is "
     note += f"{_SCALE_BAR:g} mm long:"
     room = (width - 2 * options.margin) / Text(np.zeros(2), 1.0, note).box[1, 0] / 2
     size = min(_NOTE_HEIGHT, 2 * room)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from ..errors import InputError
@@ -19,7 +19,7 @@ from .book import workshop_book
 from .cutlist import material, write_bill, write_cut_list
 from .cutsheets import Sheet, cut_sheets, template_sheets
 from .dxf import write_dxf
-from .options import CutOptions, Tolerances
+from .options import UNFIT, CutOptions, Tolerances
 from .pieces import PartsList
 from .read_me import read_me
 from .stock import StockPlan, stock_plan
@@ -38,6 +38,7 @@ def export_workshop(
     formats: Iterable[str] = tuple(SHEET_FORMATS),
     paper: str = "a3",
     title: str = "Kit of parts",
+    warnings: Sequence[str] = (),
     force: bool = False,
     overwrite: bool = False,
 ) -> list[Path]:
@@ -57,7 +58,9 @@ def export_workshop(
     formats : of the sheets, "svg" and "dxf"
     paper : of the book, "a4" or "a3"
     title : what the book is called
-    force : write the files also where parts can't be cut as they are
+    warnings : what stops the kit from being built, in sentences: on every page, sheet and in
+        READ_ME.txt, as whoever builds it sees nothing else
+    force : write the files also where parts can't be cut as they are, with that as a warning
 
     Raises InputError when a file exists already and `overwrite` is false, for what can't be cut
     (see `Blanks.problems`), and for unknown formats or paper.
@@ -66,10 +69,20 @@ def export_workshop(
     blanks = Blanks(parts, unit, options)
     if not force:
         blanks.check()
-    sheets, bars = cut_sheets(blanks, force=force), _bars(blanks, force)
+    warnings = list(dict.fromkeys([*warnings, *blanks.problems]))
+    warning = f"{UNFIT}, see READ_ME.txt" if warnings else ""
+    sheets = cut_sheets(blanks, force=force, warning=warning)
+    bars = _bars(blanks, force)
     drawings = [assembly_drawing(parts, pieces.design.name, unit) for pieces in parts.designs]
     book = workshop_book(
-        blanks, sheets, bars, drawings, paper=paper, title=title, tolerances=tolerances
+        blanks,
+        sheets,
+        bars,
+        drawings,
+        paper=paper,
+        title=title,
+        tolerances=tolerances,
+        warnings=warnings,
     )
     folder = make_folder(folder)
     done = [write_cut_list(folder / "cut_list.csv", blanks, tolerances, overwrite=overwrite)]
@@ -97,10 +110,10 @@ def export_workshop(
         done += save_assembly_drawing(drawing, folder, overwrite=overwrite)
     for stem, found in {
         "cut_sheet": sheets,
-        "templates": template_sheets(blanks, force=force),
+        "templates": template_sheets(blanks, force=force, warning=warning),
     }.items():
         done += _write_sheets(found, folder / stem, writers, overwrite)
-    text = read_me(title, blanks, done)
+    text = read_me(title, blanks, done, warnings)
     return [*done, write_text(folder / "READ_ME.txt", text, overwrite=overwrite)]
 
 

@@ -3,7 +3,9 @@ gaps."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +13,8 @@ from ..checks import check_not_negative, check_positive
 from ..errors import InputError
 from ..units import LENGTHS
 
+UNFIT = "NOT FIT TO BE BUILT"  # on all files of a kit that are written nevertheless
+_NEARLY_ALL = 2.5  # standard deviations: 99 of a hundred errors are smaller
 NOTE_ROOM = 24.0  # mm at a sheet's lower edge, for the notes and the scale bar under them
 
 
@@ -31,14 +35,30 @@ def tenths(length: float) -> str:
 
 @dataclass(frozen=True)
 class Tolerances:
-    """What the workshop should keep to: length in mm, angle in degrees."""
+    """What the workshop should keep to: length in mm, angle in degrees; why : that, in words."""
 
     length: float = 0.5
     angle: float = 0.5
+    why: str = ""
 
     def __post_init__(self) -> None:
         for name in ("length", "angle"):
             check_positive(f"tolerance.{name}", getattr(self, name))
+
+    @classmethod
+    def tried(cls, buildable: Sequence[Mapping[str, Any]], unit: str) -> Tolerances | None:
+        """Limits within which nearly all of the errors lie that a kit's designs were tried with:
+        what a verdict holds for. None where none were tried.
+
+        buildable : verdicts, as results have them; unit : the designs' unit of length
+        """
+        found = [one["tolerance"] for one in buildable if one.get("tolerance")]
+        if not any(one["samples"] for one in found):
+            return None
+        length = _NEARLY_ALL * min(one["length"] for one in found) * millimetres(unit)
+        angle = _NEARLY_ALL * float(np.degrees(min(one["angle"] for one in found)))
+        why = f"{_NEARLY_ALL:g} standard deviations of the errors that the designs were tried with"
+        return cls(float(f"{length:.2g}"), float(f"{angle:.2g}"), why)
 
 
 @dataclass(frozen=True)

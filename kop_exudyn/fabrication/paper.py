@@ -15,7 +15,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from ..drawing.labels import text_extent
-from ..drawing.style import FAINT, INK, QUIET, show_dollars, style
+from ..drawing.style import FAINT, INK, QUIET, WARNING, show_dollars, style
 from ..errors import InputError
 from ..files.files import write_bytes
 from ..provenance import __version__
@@ -74,6 +74,13 @@ class Page:
         key = (colour, width * 72 * _MM, *sorted(options.items()))
         self._lines.setdefault(key, []).append(np.asarray(points, float))
 
+    def note(self, text: str, size: float = 7.5, **options: Any) -> float:
+        """Paragraphs at the top, within the page's width; the height that they take, mm."""
+        lines = [line for one in text.split("\n") for line in wrapped(one, size, self.room[0])]
+        style = {"va": "top", "color": QUIET, **options}
+        self.text(self.low[0], self.high[1], "\n".join(lines), size, **style)
+        return text_extent("\n".join(lines), size)[1] + 3.0
+
     def finish(self) -> Figure:
         """The figure, with all lines: collected, they are drawn much faster than one by one."""
         for (colour, width, *options), lines in self._lines.items():
@@ -93,10 +100,12 @@ class Book:
 
     paper : of `PAPERS`
     title : what all of them are about
+    warning : stands on every page, in red
     """
 
     paper: str
     title: str
+    warning: str = ""
     pages: list[Page] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -128,9 +137,7 @@ class Book:
             page = self.page(heading)
             y = page.high[1] - step
             if note and number == 0:
-                lines = note.split("\n")
-                page.text(page.low[0], y, note, 7.5, va="top", color=QUIET)
-                y -= 4.0 * len(lines) + 3.0
+                y -= page.note(note)
             lines_high = max(head.count("\n") for head in heads)
             y -= step * 0.75 * lines_high
             _row(page, heads, widths, right, y, size, weight="bold")
@@ -150,7 +157,7 @@ class Book:
         # no dates: the same kit gives the same bytes
         with style(), PdfPages(buffer, metadata={"CreationDate": None, "Title": self.title}) as pdf:
             for number, page in enumerate(self.pages, 1):
-                _frame(page, self.title, number, len(self.pages))
+                _frame(page, self.title, number, len(self.pages), self.warning)
                 figure = page.finish()
                 show_dollars(figure)
                 pdf.savefig(figure)
@@ -171,7 +178,19 @@ def fitting_scale(size: np.ndarray, room: np.ndarray, least: float = 1.0) -> flo
     return next((s for s in scales if (np.asarray(size) / s <= room).all()), scales[-1])
 
 
-def _frame(page: Page, title: str, number: int, of: int) -> None:
+def wrapped(text: str, size: float, room: float) -> list[str]:
+    """The lines of a text, broken between words where it is wider than the room in mm."""
+    lines = [""]
+    for word in text.split(" "):
+        longer = f"{lines[-1]} {word}" if lines[-1] else word
+        if lines[-1] and text_extent(longer, size)[0] > room:
+            lines.append(word)
+        else:
+            lines[-1] = longer
+    return lines
+
+
+def _frame(page: Page, title: str, number: int, of: int, warning: str) -> None:
     """Border and title block: what, scale with its bar, which page."""
     width, height = PAPERS[page.paper]
     left, right, bottom, top = _BORDER, width - _BORDER, _BORDER, height - _BORDER
@@ -188,6 +207,8 @@ def _frame(page: Page, title: str, number: int, of: int) -> None:
     )
     page.text(left + 3, bottom + 4.5, _cut(page.heading, 8.5, middle - left - 6), 8.5, va="center")
     page.text(last + 3, bottom + 10.5, f"Page {number} of {of}", 8.5, va="center")
+    if warning:
+        page.text(left, top + 4.0, warning, 9, weight="bold", va="center", color=WARNING)
     paper = f"{page.paper.upper()}, lengths in mm · kop_exudyn {__version__}"
     page.text(last + 3, bottom + 4.5, paper, 6.5, va="center", color=QUIET)
     if page.scale is None:

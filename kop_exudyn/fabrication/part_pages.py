@@ -65,16 +65,11 @@ def plate_pages(book: Book, blanks: Blanks) -> None:
     note = blanks.plates[0]
     for first in range(0, len(plates), across * down):
         page = book.page("Corner plates", scale)
-        page.text(
-            page.low[0],
-            page.high[1],
+        page.note(
             f"Bolt holes {note.bolt_hole:g} mm, "
             f"{_list(note.bolts)} mm from the corner point along either axis; "
-            f"{note.board.thickness:g} mm thick. "
-            "Turned over, a plate turns the other way.",
-            7.5,
-            va="top",
-            color=QUIET,
+            f"{note.board.thickness:g} mm thick. Both legs are alike: the label's side is the "
+            "outside of the bend. Bolt plates to the faces that look away from crossing lamellas."
         )
         for k, plate in enumerate(plates[first : first + across * down]):
             corner = page.low + cell * [k % across, down - 1 - k // across]
@@ -110,8 +105,7 @@ def cell_pages(book: Book, blanks: Blanks) -> None:
             at = np.array([page.low[0] if page else 0.0, below])
             if page is None or at[1] - height < page.low[1]:
                 page = book.page("Plates, ears and arms", scale)
-                page.text(page.low[0], page.high[1], note, 7.5, va="top", color=QUIET)
-                at = np.array([page.low[0], page.high[1] - 8.0])
+                at = np.array([page.low[0], page.high[1] - page.note(note) - 2.0])
             below = at[1] - height
         middle = at + [width / 2, -template.size[1] / scale / 2]
         _template(page, template, middle - np.mean(template.box, axis=0) / scale, scale)
@@ -151,19 +145,15 @@ def stock_pages(book: Book, blanks: Blanks, plan: StockPlan | None) -> None:
         bar = plan.bars[alike[0]]
         if page is None or y - 11.0 < page.low[1]:
             page = book.page(f"Bars to saw, {blanks.board.section} mm", scale)
-            page.text(
-                page.low[0],
-                page.high[1],
+            noted = page.note(
                 f"{counted(len(plan.bars), 'bar')}: {_lengths(plan)}; "
                 f"{plan.length / 1000:.2f} m in all, "
                 f"{100 * plan.used:.0f} % of it used; no plan needs less than "
                 f"{plan.least / 1000:.2f} m. "
-                f"Kerf {blanks.options.kerf:g} mm. Saw from the left; lengths in mm.",
-                7.5,
-                va="top",
-                color=QUIET,
+                f"Kerf {blanks.options.kerf:g} mm. Saw from the left; lengths in mm: those of "
+                "pieces too short for it are in the cut list.",
             )
-            y = page.high[1] - 8.0
+            y = page.high[1] - noted - 2.0
         y -= 10.0
         x = page.low[0] + _NUMBERS
         numbers = f"{alike[0] + 1}" + (f"–{alike[-1] + 1}" if len(alike) > 1 else "")

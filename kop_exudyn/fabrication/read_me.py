@@ -7,7 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..files.read_me import read_me_text
+from .assembly import stands_on_edge
+from .assembly_pages import explanation
 from .blanks import Blanks
+from .options import UNFIT
+from .placement import PlacedPieces
 from .sources import EITHER, sources
 
 # Beginnings of file names; the first that fits counts.
@@ -77,7 +81,8 @@ _COLUMNS = {
     r"parts": "labels of the lamella's pieces, from one end to the other",
     r"joints?": "numbers of the joints: small and grey in the drawing",
     r"variant": "as is, or how else the part is built in: a mirrored straight piece has its side 2 "
-    "first, a flipped corner is turned over, a mirrored cell has top and bottom changed",
+    "first, a mirrored cell has top and bottom changed, a flipped corner bends the other way, see "
+    "the assembly drawing",
     r"place": "of the piece along its lamella, from 1",
     r"layer": "lower or upper piece at its joint",
     r"slot": "whether its slot opens up or down",
@@ -88,17 +93,31 @@ _COLUMNS = {
     "cell, at its upper and at its lower plate",
     r"side_[12]_mm": "how long that side is along its axis",
     r"side_[12]_towards": "what is at its end",
-    r"turn_deg": "of a corner: by how much it turns, counter-clockwise about the joints' axes when "
-    "walking from before to after",
+    r"turn_deg": "of a corner: by how much the lamella turns left there, seen from above, when "
+    "walking from before to after; less than 0: right (flipped)",
     r"(before|after)": "elements that meet at the corner",
     r"[xyz]_mm": "the place, in millimetres, as in the design's file",
     r"(lower|upper)": "elements that cross at the joint",
 }
 
 
-def read_me(title: str, blanks: Blanks, files: Sequence[Path]) -> str:
-    """The text of READ_ME.txt; files : all that lie in the folder."""
-    source = sources(blanks)
-    sentences = ["All lengths are in millimetres, angles in degrees.", source.note]
+_ON_EDGE = {
+    r"turn_deg": "of a corner: by how much the lamella, which stands on edge, bends up at its ends "
+    "there; less than 0: down (flipped)"
+}
+
+
+def read_me(title: str, blanks: Blanks, files: Sequence[Path], warnings: Sequence[str] = ()) -> str:
+    """The text of READ_ME.txt.
+
+    files : all that lie in the folder
+    warnings : what stops the kit from being built, in sentences
+    """
+    source, placed = sources(blanks), [PlacedPieces.of(own) for own in blanks.parts.designs]
+    sentences = [f"{UNFIT}: {'; '.join(warnings)}."] if warnings else []
+    sentences += ["All lengths are in millimetres, angles in degrees.", source.note]
     sentences += [EITHER] if source.either else []
-    return read_me_text(title, sentences, files, _FILES, _COLUMNS)
+    drawn = dict.fromkeys(explanation(one) for one in placed)
+    sentences += [f"In assembly drawings: {' · '.join(text.splitlines())}." for text in drawn]
+    columns = _COLUMNS | (_ON_EDGE if any(map(stands_on_edge, placed)) else {})
+    return read_me_text(title, sentences, files, _FILES, columns)

@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import pypdf
 import pytest
 from support.settings import ONE_STEP
 
@@ -47,6 +48,7 @@ def test_a_design_alone_is_written_for_other_programs(tmp_path, repository, caps
     "options, named",
     [
         (["--only", "workshop"], "--only"),
+        (["--sheet", "500,500"], "--sheet: is for a kit's workshop folder"),
         (["--stock", "2400,-1"], "positive numbers"),
         (["--kerf", "-1"], "not below 0"),
         (["--paper", "letter"], "letter"),
@@ -90,4 +92,11 @@ def test_what_stops_a_kit_from_being_built_is_named_and_can_be_overruled(
     assert "of its elastic limit" in error and "--force" in error and "small" in error
     assert not (tmp_path / "out").exists()
     assert main([*command, "--force", "--only", "workshop", "--paper", "a4"]) == 0
-    assert (tmp_path / "out" / "workshop" / "workshop.pdf").exists()
+    # whoever builds it has the folder alone, and hears of it there
+    folder = tmp_path / "out" / "workshop"
+    told = " ".join((folder / "READ_ME.txt").read_text(encoding="utf-8").split())
+    assert "NOT FIT TO BE BUILT: small" in told and "of its elastic limit" in told
+    pages = [page.extract_text() for page in pypdf.PdfReader(folder / "workshop.pdf").pages]
+    assert "of its elastic limit" in " ".join(pages[0].split())
+    assert all("NOT FIT TO BE BUILT, see page 1" in text for text in pages)
+    assert "NOT FIT TO BE BUILT, see READ_ME.txt" in (folder / "cut_sheet_1.dxf").read_text()

@@ -21,12 +21,13 @@ from kop_exudyn.exchange.export import (
     export_desk,
     export_simulation,
 )
-from kop_exudyn.exchange.gltf import glb_bytes
+from kop_exudyn.exchange.gltf import common_origin, glb_bytes
 from kop_exudyn.exchange.states import states_of_kit, states_of_simulation
 from kop_exudyn.exchange.vtk import write_vtu
 from kop_exudyn.fabrication.pieces import parts_list_of
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings
+from kop_exudyn.structures.fitting import Placement
 from kop_exudyn.structures.loads import LoadCase
 from kop_exudyn.units import Units
 
@@ -99,6 +100,22 @@ def test_glb_is_in_metres_with_y_up_and_knows_every_rod(folder, state):
     volume = sum(mesh.volume for mesh in rods.values())
     q = state.equilibrium.q
     assert volume == pytest.approx(state.scene.rest_lengths(q).sum() * 0.03 * 0.004, rel=0.01)
+
+
+def test_states_of_a_design_far_away_are_moved_alike(state, tmp_path):
+    """Each was moved by its own middle: beside each other they were centimetres apart."""
+    fields = {"name": "far", "units": MM, "beside_target": True, "joints": state.design.joints}
+    there = type("Named", (), fields | {"origin": np.array([5e7, 5e7, 0.0])})()
+    states = [replace(state, design=there, target=None, name=name) for name in ("one", "other")]
+    turned = Placement(np.diag([1.0, -1.0, -1.0]), np.zeros(3))
+    states[1] = replace(states[1], placement=turned)
+    origin = common_origin(states)
+    assert np.abs(origin - [5e7, 5e7, 0.0]).max() < 1e4 and (common_origin([state]) == 0).all()
+    for one in states:
+        data = glb_bytes([one], origin=origin)
+        scene = trimesh.load(trimesh.util.wrap_as_stream(data), file_type="glb")
+        edge = scene.graph.transforms.edge_data[(scene.graph.base_frame, "origin")]
+        np.testing.assert_allclose(edge["metadata"]["origin_metres"], origin / 1000)
 
 
 def test_glb_of_millimetres_far_away_keeps_its_digits(state):

@@ -167,6 +167,13 @@ def test_parts_that_can_not_be_cut_are_refused_unless_forced(parts, tmp_path):
     assert not (tmp_path / "refused").exists()
     files = export_workshop(parts, tmp_path / "forced", "m", options=broad, formats=[], force=True)
     assert (tmp_path / "forced" / "cut_list.csv") in files
+    text = (tmp_path / "forced" / "READ_ME.txt").read_text(encoding="utf-8")
+    assert "NOT FIT TO BE BUILT: part" in text and "joint hole of 11 mm" in " ".join(text.split())
+
+
+def test_nothing_is_said_of_a_kit_that_is_fit(folder):
+    assert "NOT FIT" not in (folder / "READ_ME.txt").read_text(encoding="utf-8")
+    assert "NOT FIT" not in (folder / "cut_sheet_1.dxf").read_text()
 
 
 def test_files_are_not_overwritten_unasked(parts, folder):

@@ -134,3 +134,15 @@ def test_names_on_strips_keep_off_their_joint_holes(parts):
             )
             top, bottom = label.at[1] + label.height / 2, label.at[1] - label.height / 2
             assert -half < bottom and top < -strip.hole / 2
+
+
+def test_notes_are_as_wide_as_their_page():
+    """One of a kit of cells ran through the frame of an A4 page, and off the paper."""
+    for paper in ("a4", "a3"):
+        page = Page(paper, "")
+        height = page.note("word " * 150 + "\nanother paragraph")
+        (text,) = page.ax.texts
+        lines = text.get_text().split("\n")
+        assert len(lines) > 2 and lines[-1] == "another paragraph"
+        assert max(text_extent(line, 7.5)[0] for line in lines) <= page.room[0]
+        assert height >= text_extent("\n".join(lines), 7.5)[1]
