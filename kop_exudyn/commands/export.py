@@ -87,8 +87,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--tolerance",
         type=number_pair,
         metavar="MM,DEG",
-        help="how exactly lengths and angles should be cut (default: 2.5 standard deviations of "
-        "the errors that the designs were tried with, else 0.5,0.5)",
+        help="how exactly lengths and angles should be cut (default: 0.5,0.5, and at most 2.5 "
+        "standard deviations of the errors that the designs were tried with)",
     )
     shop.add_argument(
         "--paper", choices=("a4", "a3"), default="a3", help="of workshop.pdf (default: %(default)s)"
@@ -127,7 +127,7 @@ def _kit(args: argparse.Namespace) -> tuple[list[Path], list[str]]:
     options = _options(args, usual_options(result.designs))
     blanks = Blanks(parts, unit, options) if args.only != "desk" else None
     tried = Tolerances.tried(result.buildable, unit)
-    tolerances = Tolerances(*args.tolerance) if args.tolerance else tried or Tolerances()
+    tolerances = Tolerances(*args.tolerance) if args.tolerance else Tolerances().within(tried)
     if tried and (tolerances.length > tried.length or tolerances.angle > tried.angle):
         log.warning(
             "the designs were tried with smaller errors: %g mm and %g degrees hold nearly all",

@@ -57,8 +57,17 @@ class Tolerances:
             return None
         length = _NEARLY_ALL * min(one["length"] for one in found) * millimetres(unit)
         angle = _NEARLY_ALL * float(np.degrees(min(one["angle"] for one in found)))
-        why = f"{_NEARLY_ALL:g} standard deviations of the errors that the designs were tried with"
-        return cls(float(f"{length:.2g}"), float(f"{angle:.2g}"), why)
+        return cls(float(f"{length:.2g}"), float(f"{angle:.2g}"))
+
+    def within(self, tried: Tolerances | None) -> Tolerances:
+        """These, or smaller ones where designs were tried with no larger errors, see `tried`."""
+        if tried is None:
+            return self
+        why = (
+            f"at most {_NEARLY_ALL:g} standard deviations of the errors that the designs were "
+            "tried with"
+        )
+        return Tolerances(min(self.length, tried.length), min(self.angle, tried.angle), why)
 
 
 @dataclass(frozen=True)
