@@ -254,15 +254,21 @@ def _about_published(result: KitResult) -> str:
     )
 
 
+_ORIGINS = {
+    "relaxed": "that of the relaxed stage",
+    "model": "found under the model",
+    "neighbour": "the kit of the next larger size, with parts merged",
+}
+
+
 def _about_starts(tried: Sequence[TriedStart]) -> str:
     """From how many starts the assigned stage ran, and which one was kept."""
     ends = [start.optimised for start in tried if start.optimised is not None]
     kept = next(start for start in tried if start.kept)
-    origin = "that of the relaxed stage" if kept.origin == "relaxed" else "found under the model"
     others = ", ".join(f"{end:.4g}" for end in sorted(ends))
     return (
         f"{counted(len(tried), 'start')} of the assigned stage, the best {len(ends)} optimised "
-        f"(J = {others}); the one kept is {origin}."
+        f"(J = {others}); the one kept is {_ORIGINS[kept.origin]}."
     )
 
 

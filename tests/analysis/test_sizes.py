@@ -11,6 +11,8 @@ from support.zigzags import zigzags
 
 from kop_exudyn.analysis.sizes import KitCost, deviation, smallest_kit, trade_off, unmet
 from kop_exudyn.errors import InputError
+from kop_exudyn.io.results import load_result
+from kop_exudyn.report.kit_report import write_kit_report
 from kop_exudyn.search.dataset import Dataset
 from kop_exudyn.search.neighbours import resized
 from kop_exudyn.search.pool import DesignPool
@@ -70,7 +72,9 @@ def test_no_kit_of_a_trade_off_deviates_more_than_a_smaller_one(designs):
     assert row["cost"] == pytest.approx(4 + 0.1 * pieces + 0.02 * (pieces - corners))
 
 
-def test_with_more_effort_each_size_is_sought_from_scratch_and_from_its_neighbour(designs):
+def test_with_more_effort_each_size_is_sought_from_scratch_and_from_its_neighbour(
+    designs, tmp_path
+):
     """A kit merged from a larger one may be far from the best of its size."""
     sizes = [{"linear": n, "angular": 2} for n in (2, 3)]
     merged = trade_off(designs, sizes, settings=SETTINGS)
@@ -84,6 +88,11 @@ def test_with_more_effort_each_size_is_sought_from_scratch_and_from_its_neighbou
     assert kits[0].origin == ("3 linear, 2 angular" if kept == "neighbour" else "scratch")
     ends = [kit[0].result.stages["assigned"].value for kit in (kits, merged)]
     assert ends[0] <= ends[1] * (1 + 1e-6)
+    # files and page know what the kits began with
+    for number, kit in enumerate(kits):
+        page = write_kit_report(kit.result, tmp_path / str(number))
+        assert "the one kept is " in page.read_text(encoding="utf-8")
+        assert len(load_result(tmp_path / str(number) / "result.json")["tried"]) > 1
 
 
 def test_the_smallest_kit_that_will_do(designs, middle):
