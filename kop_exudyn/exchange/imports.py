@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..geometry.mesh_cleaning import pieces_of
+from ..geometry.mesh_files import read_mesh
 from ..geometry.mesh_surface import MeshSurface, load_mesh_surface
 from ..structures.base import Design, design_from_dict
 from ..structures.nets import NetClass, net_class, net_classes
@@ -169,7 +171,16 @@ def _in_plane(drawn: DrawnNetwork, order: _Order) -> Imported:
         goal = mesh_target(relative(target, order.out), frame, ratio * drawn.options.scale)
     data = order.data(drawn, {"target": goal, "free_ends": drawn.options.free_ends})
     _check(drawn, data, order.out)
-    return Imported(data, drawn, findings)
+    return Imported(data, drawn, findings + (_piece_doubts(target) if target is not None else []))
+
+
+def _piece_doubts(target: Path) -> list[Finding]:
+    """A finding where a target isn't one surface: joints may be drawn to several."""
+    pieces = pieces_of(read_mesh(target)[1])
+    if pieces == 1:
+        return []
+    text = f"{target.name} is in {pieces} pieces, and joints are drawn to the nearest: give one"
+    return [Finding("suspicious", text)]
 
 
 def _on_surface(drawn: DrawnNetwork, order: _Order) -> Imported:

@@ -158,6 +158,15 @@ def _sense(faces: np.ndarray) -> np.ndarray:
     return ((b > a).astype(int) + (c > b) + (a > c)) % 2 == 0
 
 
+def pieces_of(faces: np.ndarray) -> int:
+    """Of how many pieces that share no vertex a mesh of faces (F, 3) is."""
+    used, corners = np.unique(faces, return_inverse=True)
+    a, b, c = corners.reshape(-1, 3).T
+    ones = np.ones(2 * len(a))
+    graph = coo_array((ones, (np.r_[a, b], np.r_[b, c])), shape=(len(used), len(used)))
+    return int(connected_components(graph, directed=False)[0])
+
+
 def triangles_of(polygons: Iterable[Sequence[int]], vertices: np.ndarray) -> np.ndarray:
     """(F, 3) triangles of polygons: convex quads are cut along their shorter diagonal, other convex
     polygons from their first corner, all others ear by ear."""

@@ -415,3 +415,19 @@ class TestMixedUnits:
         options = ("--as", "grid", *RODS, "--surface", mesh)
         status, told, _ = imported(capsys, corpus / "unit_m.dxf", "--out", out, *options)
         assert status == 0 and "times as large as the net: is it in the drawing's unit?" in told
+
+
+def test_a_target_of_several_pieces_is_pointed_out(tmp_path, capsys):
+    """Joints went to whichever of two sheets was nearest, without a word."""
+    net = [f"v {a} {k} 0\nv {b} {k} 0" for k in range(3) for a, b in ((-0.2, 2.2),)]
+    net += [f"v {k} {a} 0\nv {k} {b} 0" for k in range(3) for a, b in ((-0.2, 2.2),)]
+    lines = "\n".join([*net, *(f"l {2 * k + 1} {2 * k + 2}" for k in range(6))])
+    (tmp_path / "net.obj").write_text(lines + "\n")
+    sheet = "v -1 -1 {0}\nv 3 -1 {0}\nv 3 3 {0}\nv -1 3 {0}\n"
+    for name, sheets in (("one.obj", [0.0]), ("two.obj", [0.0, 0.1])):
+        faces = [f"f {4 * k + 1} {4 * k + 2} {4 * k + 3} {4 * k + 4}\n" for k in range(len(sheets))]
+        (tmp_path / name).write_text("".join([*map(sheet.format, sheets), *faces]))
+        out = tmp_path / f"{name}.json"
+        options = ("--target", tmp_path / name, "--opening", "35deg", *RODS, "--out", out)
+        status, told, _ = imported(capsys, tmp_path / "net.obj", *options)
+        assert status == 0 and ("two.obj is in 2 pieces" in told) == (name == "two.obj")
