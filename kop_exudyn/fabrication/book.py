@@ -15,7 +15,7 @@ from .cutsheets import Sheet
 from .options import UNFIT, Tolerances, tenths
 from .paper import Book
 from .part_pages import cell_pages, plate_pages, sheet_pages, stock_pages, strip_pages
-from .sources import EITHER, sources
+from .sources import EITHER, NO_PLATES, sources
 from .stock import StockPlan
 
 # of cut lists, what stands in the note above or on the parts' own pages
@@ -104,4 +104,6 @@ def _note(blanks: Blanks, tolerances: Tolerances) -> str:
         lines.append(source.note)
     if source.either:
         lines.append(EITHER)
+    if not blanks.options.corners and any(kind.angular for kind in kinds):
+        lines.append(NO_PLATES)
     return "\n".join(lines)

@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..files.read_me import read_me_text
+from ..kit.kinds import part_kind
 from .assembly import stands_on_edge
 from .assembly_pages import explanation
 from .blanks import Blanks
 from .options import UNFIT
 from .placement import PlacedPieces
-from .sources import EITHER, sources
+from .sources import EITHER, NO_PLATES, sources
 
 # Beginnings of file names; the first that fits counts.
 _FILES = {
@@ -117,6 +118,8 @@ def read_me(title: str, blanks: Blanks, files: Sequence[Path], warnings: Sequenc
     sentences = [f"{UNFIT}: {'; '.join(warnings)}."] if warnings else []
     sentences += ["All lengths are in millimetres, angles in degrees.", source.note]
     sentences += [EITHER] if source.either else []
+    angular = any(part_kind(name).angular for name in blanks.parts.kit.parts)
+    sentences += [NO_PLATES] if angular and not blanks.options.corners else []
     drawn = dict.fromkeys(explanation(one) for one in placed)
     sentences += [f"In assembly drawings: {' · '.join(text.splitlines())}." for text in drawn]
     columns = _COLUMNS | (_ON_EDGE if any(map(stands_on_edge, placed)) else {})

@@ -18,6 +18,10 @@ from .options import CutOptions
 from .shapes import Template
 from .templates import templates
 
+NO_PLATES = (
+    "Corners are without plates: strips reach to the corner points, and are joined in another "
+    "way, at the angle that the cut list has for the corner."
+)
 EITHER = (
     "Straight pieces may be sawn from bars or cut from sheets: both plans are there, choose one. "
     "Everything else comes from the sheets."

@@ -274,3 +274,24 @@ def test_joints_of_cells_are_drawn_between_their_plates(name, repository):
     for text, at in names.items():
         middle = drawing.cells[int(text.split("\n")[1]) - 1].mean(axis=0) / drawing.scale
         np.testing.assert_allclose(at, middle, atol=1e-9)
+
+
+def test_every_page_of_a_large_grid_has_its_lamellas_numbers(repository):
+    """Steps say "lay out lamella n", turns count from its first end: on inner pages no number told
+    which is which."""
+    design = load_design(repository / "models" / "grids" / "01_dome.json")
+    found = cluster(design.groups, design.parameters, {"linear": 4, "angular": 2}, restarts=1)
+    drawing = assembly_drawing(parts_list(found.kit, found.assignment, [design]), "dome", "m")
+    book = Book("a4", "dome")
+    assembly_pages(book, drawing)
+    first, *others = book.pages
+    assert len(others) > 1
+    numbers = {f"({lamella.number})" for lamella in drawing.lamellas.all}
+    shown = [{t.get_text() for t in page.ax.texts} & numbers for page in (first, *others)]
+    assert shown[0] == numbers and set.union(*shown[1:]) == numbers
+    for page, own in zip(others, shown[1:]):
+        elements = [
+            int(t.get_text()) for t in page.ax.texts if t.get_size() == 5 and t.get_rotation()
+        ]
+        there = {f"({drawing.lamellas.place[number][0]})" for number in elements}
+        assert there and there <= own

@@ -183,3 +183,12 @@ def test_files_are_not_overwritten_unasked(parts, folder):
         export_workshop(parts, folder, "m", formats=["pdf"], overwrite=True)
     with pytest.raises(InputError, match="paper"):
         export_workshop(parts, folder, "m", paper="letter", overwrite=True)
+
+
+@pytest.mark.parametrize("corners", [True, False])
+def test_it_is_said_how_corners_are_without_plates(corners, parts, tmp_path):
+    export_workshop(parts, tmp_path, "m", options=CutOptions(corners=corners), formats=[])
+    text = " ".join((tmp_path / "READ_ME.txt").read_text(encoding="utf-8").split())
+    book = pypdf.PdfReader(tmp_path / "workshop.pdf").pages[0].extract_text()
+    assert ("Corners are without plates" in text) == ("Corners are without plates" in book)
+    assert ("Corners are without plates" in text) != corners
