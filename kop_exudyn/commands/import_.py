@@ -256,11 +256,11 @@ def run(args: argparse.Namespace) -> int:
     ):
         if path is None:
             continue
+        check_output_file(path, overwrite=args.overwrite)
         if not path.name.lower().endswith(endings):
             raise InputError(
                 f"expected a name that ends in {' or '.join(endings)}", field=field, value=str(path)
             )
-        check_output_file(path, overwrite=args.overwrite)
     drawing = is_drawing(args.file)
     surface = args.kind is None and drawing and is_surface(args.file)
     drawn = args.edges or (drawing and not surface)
