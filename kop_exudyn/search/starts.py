@@ -96,7 +96,8 @@ def assigned_from_starts(
 
     built : the relaxed designs at their parts, which is always a start
     bases : evaluations of all designs at which the objective is modelled, one list a base
-    neighbours : further starts, of kits of other sizes, not confirmed yet
+    neighbours : further starts, of kits of other sizes, not confirmed yet; they are optimised
+        whatever their J
 
     Effort says how many starts are looked for (`StageSettings.effort`). The start of the relaxed
     stage is one of them; they are optimised in the order of J, unless J is far above the lowest.
@@ -115,6 +116,8 @@ def assigned_from_starts(
     limit = _PROMISING * min(start.merit for _, start in starts)
     promising = [n for n in range(len(starts)) if n == 0 or starts[n][1].merit <= limit]
     order = sorted(promising, key=lambda n: starts[n][1].merit)[: effort.optimised]
+    # what a merged kit costs at first says little of where it ends
+    order += [n for n, (origin, _) in enumerate(starts) if origin == "neighbour" and n not in order]
     best, which = built, 0
     ends: list[tuple[int, StageResult]] = []
     seen: dict[int, list[StageResult]] = {}

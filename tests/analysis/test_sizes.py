@@ -81,7 +81,9 @@ def test_with_more_effort_each_size_is_sought_from_scratch_and_from_its_neighbou
     again = replace(SETTINGS, stages=replace(STAGES, effort="normal"))
     kits = trade_off(designs, sizes, settings=again)
     assert merged[0].origin == "3 linear, 2 angular"
-    assert {"relaxed", "neighbour"} <= {one.origin for one in kits[0].result.tried}
+    assert "relaxed" in {one.origin for one in kits[0].result.tried}
+    (neighbour,) = (one for one in kits[0].result.tried if one.origin == "neighbour")
+    assert neighbour.optimised is not None
     assert "neighbour" not in {one.origin for one in kits[1].result.tried}
     assert {"direct", "relaxed", "assigned"} <= kits[0].result.stages.keys()
     kept = next(one.origin for one in kits[0].result.tried if one.kept)
