@@ -106,14 +106,14 @@ def _as_typed(error: InputError, options: set[str]) -> str:
 
 def _nearby(path: Path) -> str:
     """What the folder of a path that isn't there has instead, if anything looks like it."""
+    if os.path.islink(path):
+        return f": a link to {os.readlink(path)}, which isn't there"
     try:
         names = sorted(os.listdir(path.parent))
     except OSError:
         return ""
     # endings are alike for all: names in front of them are compared
     stems = {name.split(".")[0].lower(): name for name in reversed(names)}
-    if os.path.islink(path):
-        return f": a link to {os.readlink(path)}, which isn't there"
     near = get_close_matches(path.name.split(".")[0].lower(), list(stems), 1, _ALIKE)
     return f" (did you mean {str(path.parent / stems[near[0]])!r}?)" if near else ""
 

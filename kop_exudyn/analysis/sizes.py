@@ -295,16 +295,15 @@ class _Chain:
             announce=lambda phase: self.announce(f"{shown}: {phase}"),
             examine=(lambda pool: None) if self.kits else self.examine,
         )
-        origin = _SCRATCH
-        kept = next(one.origin for one in result.tried if one.kept)
-        if start is not None and before is not None and (not anew or kept == "neighbour"):
-            origin = _listed(start.sizes)
-        if start is not None and before is not None and not anew:
+        merged = any(one.kept and one.origin == "neighbour" for one in result.tried)
+        led = start if before is not None and (merged or not anew) else None
+        origin = _SCRATCH if led is None else _listed(led.sizes)
+        if led is not None and not anew:
             # what the whole chain began with: it is what this kit is compared with
-            earlier = {s: start.result.stages[s] for s in ("direct", "relaxed")}
+            earlier = {s: led.result.stages[s] for s in ("direct", "relaxed")}
             result.stages = {**earlier, **result.stages}
-            result.clustering = start.result.clustering
-            relaxed = [event for event in start.result.events if event.stage == "relaxed"]
+            result.clustering = led.result.clustering
+            relaxed = [event for event in led.result.events if event.stage == "relaxed"]
             result.events = [*relaxed, *result.events]
         found = SizedKit(result, dict(sizes), origin, perf_counter() - begin)
         log.info("%s parts: largest deviation %.3g %%", shown, found.max_percent)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..wording import counted
-from .options import add_run_or_design
+from .options import add_run_or_design, given
 from .output import add_json, report
 from .values import not_negative_number, number_list, number_pair, positive_number
 
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from ..units import Units
 
 log = logging.getLogger(__name__)
+
+# options of the workshop's sizes, as `CutOptions` has them
+_SIZES = ("sheet", "stock", "kerf", "gap", "clearance", "joint_hole", "bolt_hole")
 
 HELP = "write cut lists, cut sheets, assembly plans and 3D files of a finished kit, or of a design"
 DESCRIPTION = """Of a finished kit (the folder that `kop optimize` wrote, with the folder of its
@@ -165,21 +168,11 @@ def _design(args: argparse.Namespace) -> list[Path]:
     from ..exchange.export import export_simulation
     from ..io.designs import load_design
 
-    for name in (
-        "sheet",
-        "stock",
-        "kerf",
-        "gap",
-        "clearance",
-        "joint_hole",
-        "bolt_hole",
-        "tolerance",
-    ):
-        if getattr(args, name) is not None:
-            raise InputError(
-                "is for a kit's workshop folder: a design alone has no parts to cut",
-                field=f"--{name.replace('_', '-')}",
-            )
+    for name in given(args, *_SIZES, "tolerance"):
+        raise InputError(
+            "is for a kit's workshop folder: a design alone has no parts to cut",
+            field=f"--{name.replace('_', '-')}",
+        )
     if args.folder is not None or args.only == "workshop":
         raise InputError(
             "a design alone has no parts to cut: find a kit first (kop optimize)",
@@ -193,9 +186,7 @@ def _options(args: argparse.Namespace, usual: CutOptions) -> CutOptions:
     """The usual sizes, and what is given instead."""
     from dataclasses import replace
 
-    names = ("sheet", "stock", "kerf", "gap", "clearance", "joint_hole", "bolt_hole")
-    given = {name: value for name in names if (value := getattr(args, name)) is not None}
-    return replace(usual, **given, corners=not args.no_corners)
+    return replace(usual, **given(args, *_SIZES), corners=not args.no_corners)
 
 
 def _unit(args: argparse.Namespace, units: Units | None) -> str:

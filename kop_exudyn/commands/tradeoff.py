@@ -17,11 +17,11 @@ from .output import add_json, report, shows_progress
 from .values import part_ranges
 
 HELP = "find kits of several sizes, and show what each part more is worth"
-DESCRIPTION = """Finds a kit for each of several sizes: the largest from scratch, every other one by
-merging parts of the next larger one, and again by splitting those of the next smaller one where
-that is better. No kit deviates more than a smaller one. DIR gets tradeoff.csv, tradeoff.json, a
-figure, index.html, and a folder with the report of every kit. --resume goes on where a run was
-stopped."""
+DESCRIPTION = """Finds a kit for each of several sizes: from scratch, with the next larger kit as
+one more start (with --effort quick from that kit alone), and again by splitting parts of the next
+smaller one where that is better. No kit deviates more than a smaller one. DIR gets tradeoff.csv,
+tradeoff.json, a figure, index.html, and a folder with the report of every kit. --resume goes on
+where a run was stopped."""
 EXAMPLES = """examples:
   kop tradeoff models/conformals --designs 5 --parts linear=2:12,angular=5 --out out/sizes
   kop tradeoff models/umbrellas --parts cells=1:12 --out out/umbrella_sizes --resume

@@ -61,6 +61,7 @@ _SETTINGS = {
     "lines.linewidth": 1.6,
     "text.color": INK,
     "figure.facecolor": "white",
+    "figure.autolayout": False,  # of the caller's: figures are placed once, by their own engine
     "savefig.facecolor": "white",
     "savefig.dpi": 200,
     # the same figure gives the same bytes: no random ids in SVG files

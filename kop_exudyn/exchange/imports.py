@@ -207,8 +207,6 @@ def _on_surface(drawn: DrawnNetwork, order: _Order) -> Imported:
         try:
             mesh = load_mesh_surface(surface, chart, "z", ratio * scale, scale * drawn.origin)
         except InputError as error:
-            if error.field != "surface.file":
-                raise
             raise InputError(error.message, source=surface) from None
         said += size_doubts(surface, mesh.mesh.size, scale * size_of(drawn.curves))
         drawn = replace(drawn, findings=drawn.findings + said)

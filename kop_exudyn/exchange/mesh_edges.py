@@ -89,8 +89,7 @@ def _of_obj(content: bytes) -> Edges:
 def _of_ply(content: bytes) -> Edges:
     """Its own edges; of files without any, those of its faces."""
     found = parse_ply(content)
-    own = sorted({(min(pair), max(pair)) for pair in found.edges if pair[0] != pair[1]})
-    return found.vertices, own or _sides(found.polygons)
+    return found.vertices, _sides(found.edges, closed=False) or _sides(found.polygons)
 
 
 def _of_json(content: bytes) -> Edges:
@@ -100,8 +99,8 @@ def _of_json(content: bytes) -> Edges:
         if len(found) != 1:
             kinds = "of COMPAS, or lists of nodes and of edges or faces"
             raise InputError(f"expected one mesh or graph ({kinds}), found {len(found)}")
-        if _names_of_lists(found[0]) is not None:
-            return _listed_edges(found[0])
+        if (names := _names_of_lists(found[0])) is not None:
+            return _listed_edges(found[0], *names)
         return _mesh_edges(found[0]) if "face" in found[0] else _graph_edges(found[0])
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         if isinstance(error, InputError):
@@ -119,9 +118,9 @@ def _names_of_lists(data: Mapping[str, Any]) -> tuple[str, str] | None:
     return None if of_nodes is None or of_edges is None else (of_nodes, of_edges)
 
 
-def _listed_edges(data: Mapping[str, Any]) -> Edges:
-    """Of lists of nodes and edges, or faces: of the node-link data of networkx, and alike."""
-    of_nodes, of_edges = _names_of_lists(data) or ("", "")
+def _listed_edges(data: Mapping[str, Any], of_nodes: str, of_edges: str) -> Edges:
+    """Of lists of nodes and edges, or faces, under these names: of the node-link data of networkx,
+    and alike."""
     nodes, numbers = data[of_nodes], dict[str, int]()
     points = np.zeros((len(nodes), 3))
     for k, node in enumerate(nodes):
@@ -143,9 +142,7 @@ def _listed_edges(data: Mapping[str, Any]) -> Edges:
     for k, edge in enumerate(data[of_edges]):
         field = f"{of_edges}[{k}]"
         chains.append([number(end, field) for end in _ends(edge, field)])
-    if of_edges == "faces":
-        return points, _sides(chains)
-    return points, sorted({(min(p), max(p)) for c in chains for p in zip(c, c[1:]) if p[0] != p[1]})
+    return points, _sides(chains, closed=of_edges == "faces")
 
 
 def _place_of_node(node: Any, field: str) -> np.ndarray:
@@ -197,12 +194,8 @@ def _mesh_edges(data: Mapping[str, Any]) -> Edges:
 
 def _graph_edges(data: Mapping[str, Any]) -> Edges:
     names, points = _nodes(data, data["node"])
-    pairs = {
-        tuple(sorted((names[_key(u)], names[_key(v)])))
-        for u, others in data["edge"].items()
-        for v in others
-    }
-    return points, sorted((a, b) for a, b in pairs if a != b)
+    pairs = [(names[_key(u)], names[_key(v)]) for u, others in data["edge"].items() for v in others]
+    return points, _sides(pairs, closed=False)
 
 
 def _nodes(
@@ -228,12 +221,12 @@ def _key(key: Any) -> str:
     return str(key).strip("'\"")
 
 
-def _sides(polygons: Iterable[Sequence[int]]) -> list[tuple[int, int]]:
-    """Pairs of vertices that polygons join, each once."""
+def _sides(chains: Iterable[Sequence[int]], closed: bool = True) -> list[tuple[int, int]]:
+    """Pairs of vertices that chains join, each once; closed : whether their ends are joined."""
     pairs = {
         (min(a, b), max(a, b))
-        for polygon in polygons
-        for a, b in zip(polygon, [*polygon[1:], polygon[0]])
+        for chain in chains
+        for a, b in zip(chain, [*chain[1:], *chain[: int(closed)]])
         if a != b
     }
     return sorted(pairs)

@@ -37,6 +37,7 @@ _GAP = 1.1  # mm on either side of a crossing in which the lower rod isn't drawn
 _ROD = 2.0  # points
 _INSIDE = 3.0  # mm from a page's edge, where the numbers of lamellas that come in are
 _ENTERING = 6.5  # points, of these
+_ON_LINES = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
 _ALONG = (0.5, 0.36, 0.64, 0.24, 0.76)  # places of a label along its rod
 _AROUND = np.radians([45, 135, 225, 315, 0, 90, 180, 270])
 
@@ -132,11 +133,9 @@ class AssemblyDrawing:
             places = [first[0] + d * out + s * across for d in (5, 7, 9) for s in (0, 3, -3, 6, -6)]
             yield Label(f"({lamella.number})", 7.0, np.array(places), weight="bold")
 
-    def _entering(
-        self, scale: float, origin: np.ndarray, window: np.ndarray
-    ) -> Iterator[tuple[int, np.ndarray]]:
-        """Numbers of lamellas whose first end isn't in a window, and where they come into it: on
-        the side of their first end, as turns count from there."""
+    def _entering(self, scale: float, origin: np.ndarray, window: np.ndarray) -> Iterator[Label]:
+        """The numbers of lamellas whose first end isn't in a window, where they come into it: on
+        the side of their first end, as turns count from there. Places are on paper."""
         room = shapely.box(*(window[0] + _INSIDE), *(window[1] - _INSIDE))
         for lamella in self.lamellas.all:
             lines = [origin + line / scale for p in lamella.straight for line in self._of(p)]
@@ -146,7 +145,8 @@ class AssemblyDrawing:
             if not inside.is_empty:
                 points = shapely.get_coordinates(inside)
                 away = np.linalg.norm(points - lines[0][0], axis=1)
-                yield lamella.number, points[int(np.argmin(away))]
+                at = points[[int(np.argmin(away))]]
+                yield Label(f"({lamella.number})", _ENTERING, at, weight="bold")
 
     def _piece_labels(self, piece: Piece, scale: float) -> Iterator[Label]:
         label, kind = self.parts.label(piece), part_kind(piece.kind)
@@ -253,17 +253,8 @@ class AssemblyDrawing:
         for label, at in zip(labels, places):
             if np.all((origin + at > window[0] + 1) & (origin + at < window[1] - 1)):
                 _write(ax, label, origin + at)
-        for number, at in self._entering(scale, origin, window):
-            ax.text(
-                *at,
-                f"({number})",
-                size=_ENTERING,
-                weight="bold",
-                ha="center",
-                va="center",
-                zorder=6,
-                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
-            )
+        for label in self._entering(scale, origin, window):
+            _write(ax, label, label.places[0], zorder=6, bbox=_ON_LINES)
 
     def _draw_cells(
         self, ax: Axes, scale: float, origin: np.ndarray, clip: Any, shades: Mapping[str, Any]
@@ -288,7 +279,7 @@ class AssemblyDrawing:
                 yield np.array([line[end], line[end] + _GAP * step])
 
 
-def _write(ax: Axes, label: Label, at: np.ndarray) -> None:
+def _write(ax: Axes, label: Label, at: np.ndarray, zorder: int = 5, **options: Any) -> None:
     ax.text(
         *at,
         label.text,
@@ -300,8 +291,9 @@ def _write(ax: Axes, label: Label, at: np.ndarray) -> None:
         va="center" if "\n" in label.text else "center_baseline",
         rotation_mode="anchor",
         linespacing=1.15,
-        zorder=5,
+        zorder=zorder,
         parse_math=False,
+        **options,
     )
 
 

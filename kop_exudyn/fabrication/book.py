@@ -12,10 +12,10 @@ from .assembly_pages import assembly_pages
 from .blanks import Blanks
 from .cutlist import cut_list, material
 from .cutsheets import Sheet
-from .options import UNFIT, Tolerances, tenths
+from .options import UNFIT, Tolerances, tenths, unfit
 from .paper import Book
 from .part_pages import cell_pages, plate_pages, sheet_pages, stock_pages, strip_pages
-from .sources import EITHER, NO_PLATES, sources
+from .sources import advice
 from .stock import StockPlan
 
 # of cut lists, what stands in the note above or on the parts' own pages
@@ -62,8 +62,7 @@ def workshop_book(
     book = Book(paper, title, f"{UNFIT}, see page 1" if warnings else "")
     rows = cut_list(blanks, tolerances)
     kept = [{name: value for name, value in row.items() if name not in _ELSEWHERE} for row in rows]
-    unfit = [f"{UNFIT}: {'; '.join(warnings)}."] if warnings else []
-    book.table("Cut list", kept, "\n".join([*unfit, _note(blanks, tolerances)]))
+    book.table("Cut list", kept, "\n".join([*unfit(warnings), _note(blanks, tolerances)]))
     bought = [*material(blanks, sheets, plan), *fasteners(blanks)]
     book.table("Material and fasteners", bought)
     strip_pages(book, blanks)
@@ -99,11 +98,4 @@ def _note(blanks: Blanks, tolerances: Tolerances) -> str:
             "are lengths of the axes from the joint to the corner points, "
             f"{tenths(blanks.corners.setback)} mm beyond either sawn end."
         )
-    source = sources(blanks)
-    if source.note:
-        lines.append(source.note)
-    if source.either:
-        lines.append(EITHER)
-    if not blanks.options.corners and any(kind.angular for kind in kinds):
-        lines.append(NO_PLATES)
-    return "\n".join(lines)
+    return "\n".join([*lines, *advice(blanks)])

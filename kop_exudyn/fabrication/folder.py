@@ -113,7 +113,7 @@ def export_workshop(
         "templates": template_sheets(blanks, force=force, warning=warning),
     }.items():
         done += _write_sheets(found, folder / stem, writers, overwrite)
-    text = read_me(title, blanks, done, warnings)
+    text = read_me(title, blanks, [drawing.placed for drawing in drawings], done, warnings)
     return [*done, write_text(folder / "READ_ME.txt", text, overwrite=overwrite)]
 
 

@@ -18,6 +18,11 @@ _NEARLY_ALL = 2.5  # standard deviations: 99 of a hundred errors are smaller
 NOTE_ROOM = 24.0  # mm at a sheet's lower edge, for the notes and the scale bar under them
 
 
+def unfit(warnings: Sequence[str]) -> list[str]:
+    """The sentence that says why a kit isn't fit to be built; none where nothing stops it."""
+    return [f"{UNFIT}: {'; '.join(warnings)}."] if warnings else []
+
+
 def millimetres(unit: str) -> float:
     """Millimetres of one unit of length; InputError for a unit that isn't known."""
     if unit not in LENGTHS:

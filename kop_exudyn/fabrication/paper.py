@@ -30,6 +30,7 @@ _MM = 1 / 25.4
 _BORDER = 10.0  # mm of paper around the frame
 _BLOCK = 16.0  # mm that the title block is high
 _BAR = 60.0  # mm, at most, of the scale bar on paper
+_NOTE = 7.5  # points
 _ROUND = (1, 2, 5)
 _BOUGHT = ("diameter_mm", "joint_hole_mm", "bolt_hole_mm")  # columns of sizes that tools have
 
@@ -74,12 +75,11 @@ class Page:
         key = (colour, width * 72 * _MM, *sorted(options.items()))
         self._lines.setdefault(key, []).append(np.asarray(points, float))
 
-    def note(self, text: str, size: float = 7.5, **options: Any) -> float:
+    def note(self, text: str) -> float:
         """Paragraphs at the top, within the page's width; the height that they take, mm."""
-        lines = [line for one in text.split("\n") for line in wrapped(one, size, self.room[0])]
-        style = {"va": "top", "color": QUIET, **options}
-        self.text(self.low[0], self.high[1], "\n".join(lines), size, **style)
-        return text_extent("\n".join(lines), size)[1] + 3.0
+        lines = [line for one in text.split("\n") for line in wrapped(one, _NOTE, self.room[0])]
+        self.text(self.low[0], self.high[1], "\n".join(lines), _NOTE, va="top", color=QUIET)
+        return text_extent("\n".join(lines), _NOTE)[1] + 3.0
 
     def finish(self) -> Figure:
         """The figure, with all lines: collected, they are drawn much faster than one by one."""

@@ -7,13 +7,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..files.read_me import read_me_text
-from ..kit.kinds import part_kind
 from .assembly import stands_on_edge
 from .assembly_pages import explanation
 from .blanks import Blanks
-from .options import UNFIT
+from .options import unfit
 from .placement import PlacedPieces
-from .sources import EITHER, NO_PLATES, sources
+from .sources import advice
 
 # Beginnings of file names; the first that fits counts.
 _FILES = {
@@ -108,18 +107,21 @@ _ON_EDGE = {
 }
 
 
-def read_me(title: str, blanks: Blanks, files: Sequence[Path], warnings: Sequence[str] = ()) -> str:
+def read_me(
+    title: str,
+    blanks: Blanks,
+    placed: Sequence[PlacedPieces],
+    files: Sequence[Path],
+    warnings: Sequence[str] = (),
+) -> str:
     """The text of READ_ME.txt.
 
+    placed : the pieces of every design, as they are drawn
     files : all that lie in the folder
     warnings : what stops the kit from being built, in sentences
     """
-    source, placed = sources(blanks), [PlacedPieces.of(own) for own in blanks.parts.designs]
-    sentences = [f"{UNFIT}: {'; '.join(warnings)}."] if warnings else []
-    sentences += ["All lengths are in millimetres, angles in degrees.", source.note]
-    sentences += [EITHER] if source.either else []
-    angular = any(part_kind(name).angular for name in blanks.parts.kit.parts)
-    sentences += [NO_PLATES] if angular and not blanks.options.corners else []
+    sentences = [*unfit(warnings), "All lengths are in millimetres, angles in degrees."]
+    sentences += advice(blanks)
     drawn = dict.fromkeys(explanation(one) for one in placed)
     sentences += [f"In assembly drawings: {' · '.join(text.splitlines())}." for text in drawn]
     columns = _COLUMNS | (_ON_EDGE if any(map(stands_on_edge, placed)) else {})

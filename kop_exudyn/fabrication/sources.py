@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..kit.kinds import part_kind
 from .blanks import Blanks
 from .options import CutOptions
 from .shapes import Template
@@ -77,6 +78,16 @@ def sources(blanks: Blanks) -> Sources:
             f"longer than the longest bar of {bar:g} mm."
         )
     return Sources(sheets, bars, note, either=sheets and bars and bool(options.stock))
+
+
+def advice(blanks: Blanks) -> list[str]:
+    """What a workshop has to know of a kit's straight pieces and corners before it begins, in
+    sentences."""
+    found = sources(blanks)
+    angular = any(part_kind(name).angular for name in blanks.parts.kit.parts)
+    said = [found.note] if found.note else []
+    said += [EITHER] if found.either else []
+    return said + ([NO_PLATES] if angular and not blanks.options.corners else [])
 
 
 def on_sheets(blanks: Blanks) -> list[Template]:

@@ -169,12 +169,11 @@ def load_mesh_surface(
     vertices, faces = read_mesh(path)
     try:
         return MeshSurface(scale * vertices - origin, faces, chart, up)
-    except _NoChart as error:
-        place = _shown((error.place + origin) / scale)
-        message = f"near {place} it {error.reason}"
-        raise InputError(message, field="surface.file", value=path.name) from None
     except InputError as error:
-        raise InputError(error.message, field="surface.file", value=path.name) from None
+        message = error.message
+        if isinstance(error, _NoChart):
+            message = f"near {_shown((error.place + origin) / scale)} it {error.reason}"
+        raise InputError(message, field="surface.file", value=path.name) from None
 
 
 def is_disc(mesh: TriangleSurface) -> bool:

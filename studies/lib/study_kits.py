@@ -4,7 +4,7 @@ reports."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from kop_exudyn.analysis.verdict import VerdictSettings
@@ -20,22 +20,18 @@ from kop_exudyn.search.run import described_job
 from kop_exudyn.search.settings import JobSettings, StageSettings
 
 from .study import Study
+from .study_tasks import QUICK
 
 RELEASED = ("saddle_5t", "hemisphere_5t", "lilium", "sphere_cap_0.3")
-QUICK_STAGES = StageSettings(
+QUICK_STAGES = replace(
+    QUICK,
     schedule=(1e4,),
-    relaxed_steps=2,
     assigned_steps=3,
     round_steps=1,
     reassignments=0,
-    path_steps=2,
+    leaps=StageSettings.leaps,  # none without rounds
     rescues=0,
     restarts=2,
-    effort="quick",
-    levelling=0,
-    # these two are the published method's as well, which takes its steps whatever is said above
-    last_tolerance=0.1,
-    assigned_tolerance=0.1,
     requirements=Requirements(samples=2),
 )
 QUICK_VERDICT = VerdictSettings(samples=2)
