@@ -37,6 +37,9 @@ def library() -> ctypes.CDLL | None:
     return None
 
 
+_START = ctypes.c_char * 0  # of a buffer
+
+
 def address(
     array: np.ndarray, kind: type = np.float64, shape: tuple[int, ...] | None = None
 ) -> int:
@@ -46,6 +49,9 @@ def address(
         raise ValueError(f"expected an array of shape {shape}, got {array.shape}")
     if array.dtype != kind or not array.flags.c_contiguous:
         raise TypeError(f"expected a contiguous array of {np.dtype(kind)}, got {array.dtype}")
+    if array.flags.writeable and array.size:
+        # five times as fast, which tells: small scenes call kernels as often as they compute
+        return ctypes.addressof(_START.from_buffer(array))
     return array.ctypes.data
 
 

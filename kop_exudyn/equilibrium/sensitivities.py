@@ -54,7 +54,7 @@ class Sensitivities:
             self._strain, system.lengths, scene.stiffness, scene.rest_strain
         )
         self._energy_L, self._stress_L = energy_L, stress_L
-        self._has = np.flatnonzero(scene.length_parameter >= 0)
+        self._has = system.parameter_pattern.elements
         self._driven_values = system.values[s.n_factor_values :].copy()
         self._gradient = system.gradient.copy()
         self._length_entries = self._differentiate_by_length()
@@ -259,48 +259,30 @@ class Sensitivities:
     def _loaded(self) -> bool:
         return bool(self._system.scene.terms) or self._system.scene.weight is not None
 
-    @cached_property
+    @property
     def _driven_map(self) -> sp.csr_matrix:
-        """d(driven unknowns)/dq (n_driven, n_parameters)."""
-        d = self._system.scene.driven
-        return sp.csr_matrix(
-            (d.factors, (np.arange(len(d.dofs)), d.parameters)),
-            shape=(len(d.dofs), self._system.scene.n_parameters),
-        )
+        return self._system.scene.driven_map
 
-    def _differentiate_by_length(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Entries of d(gradient)/d(lengths' parameters): kept rows, parameters, values, one after
-        the other."""
+    def _differentiate_by_length(self) -> np.ndarray:
+        """Entries of d(gradient)/d(lengths' parameters), see `ParameterPattern`."""
         scene, has = self._system.scene, self._has
         block = np.einsum("eri,er->ei", self._B[has], self._stress_L[has])
         if scene.weight is not None:
             block += _weight_gradient_per_length(scene, self.equilibrium.state)[has]
-        rows = self._system.sparsity.rows[has]
-        columns = np.broadcast_to(scene.length_parameter[has][:, None], rows.shape)
-        keep = rows >= 0
-        return rows[keep], columns[keep], (block * scene.length_factor[has][:, None])[keep]
+        block *= scene.length_factor[has][:, None]
+        return block[self._system.parameter_pattern.kept]
 
     def _assemble_residual_q(self) -> sp.csc_matrix:
         """R_q (n_free, n_parameters)."""
-        scene, s = self._system.scene, self._system.sparsity
-        rows, columns, values = self._length_entries
-        if s.n_driven:
-            # the Hessian's columns of driven unknowns, each for the one parameter that drives it
-            driven = s.driven_column
-            rows = np.concatenate([rows, s.indices[s.n_factor_values :]])
-            columns = np.concatenate([columns, scene.driven.parameters[driven]])
-            values = np.concatenate([values, self._driven_values * scene.driven.factors[driven]])
-        free = rows < s.n_free
-        return sp.csc_matrix(
-            (values[free], (rows[free], columns[free])), shape=(s.n_free, scene.n_parameters)
-        )
+        return self._system.parameter_pattern.matrix(self._length_entries, self._driven_values)
 
     def _lengths_in_driven(self) -> sp.csr_matrix:
         """d(gradient in the driven unknowns)/d(lengths' parameters) (n_driven, n_parameters)."""
-        rows, columns, values = self._length_entries
-        driven = rows >= self._n
+        pattern = self._system.parameter_pattern
+        driven = pattern.rows >= self._n
+        rows, columns = pattern.rows[driven] - self._n, pattern.columns[driven]
         return sp.csr_matrix(
-            (values[driven], (rows[driven] - self._n, columns[driven])),
+            (self._length_entries[driven], (rows, columns)),
             shape=(self._system.sparsity.n_driven, self._system.scene.n_parameters),
         )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
+from functools import cached_property
 from time import perf_counter
 
 import numpy as np
@@ -13,7 +14,7 @@ import scipy.sparse as sp
 from ..scene.assembly import ENERGY, GRADIENT, HESSIAN
 from ..scene.assembly_choice import rod_assembly
 from ..scene.scene import Scene
-from ..scene.sparsity import sparsity_of
+from ..scene.sparsity import ParameterPattern, sparsity_of
 from ..scene.state import State
 from .block_solve import Solutions
 from .factorisation import factorisation
@@ -79,6 +80,11 @@ class System:
         self.rotations = np.flatnonzero(self.is_rotation)  # taking numbers is quicker than a mask
         # moments count as forces
         self.force_weight = np.where(self.is_rotation, 1 / scene.length_scale, 1.0)
+
+    @cached_property
+    def parameter_pattern(self) -> ParameterPattern:
+        """Where derivatives of the gradient in the parameters go."""
+        return ParameterPattern(self.scene, self.sparsity)
 
     @property
     def n_unknowns(self) -> int:

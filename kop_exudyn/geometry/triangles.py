@@ -57,13 +57,14 @@ class Closest:
         It is exact unless the surface's closest feature changes at x, where it is the derivative
         from one side.
         """
-        on_face = np.eye(3) - self.normals[:, :, None] * self.normals[:, None, :]
-        on_edge = self.edges[:, :, None] * self.edges[:, None, :]
-        feature = self.features[:, None, None]
-        return np.where(
-            feature == Feature.FACE, on_face, np.where(feature == Feature.EDGE, on_edge, 0.0)
-        )
+        out = np.eye(3) - self.normals[:, :, None] * self.normals[:, None, :]
+        others = np.flatnonzero(self.features != Feature.FACE)
+        edges = self.edges[others]  # zero at vertices
+        out[others] = edges[:, :, None] * edges[:, None, :]
+        return out
 
+
+_BY_ZEROS = np.array([Feature.FACE, Feature.EDGE, Feature.VERTEX, Feature.VERTEX])
 
 # libigl complains of trees that are left when the process ends, as they are where surfaces belong
 # to cycles of objects and garbage isn't looked for any more.
@@ -87,7 +88,7 @@ class TriangleSurface:
     def __init__(self, vertices: Any, faces: Any):
         self.vertices = _vertices(vertices)
         self.faces = _faces(faces, len(self.vertices))
-        self.normals = _unit_normals(self.vertices, self.faces)
+        self.normals, self._doubled_areas = _unit_normals(self.vertices, self.faces)
 
     @cached_property
     def size(self) -> float:
@@ -138,22 +139,23 @@ class TriangleSurface:
         features, edges = np.full(len(faces), Feature.FACE), np.zeros((len(faces), 3))
         offset, normals = points - projected, self.normals[faces]
         height = np.einsum("nk,nk->n", offset, normals)
-        aside = np.linalg.norm(offset - height[:, None] * normals, axis=1)
+        offset -= height[:, None] * normals
+        aside = np.sqrt(np.einsum("nk,nk->n", offset, offset))
         others = np.flatnonzero(
             aside > _NORMAL_ABSOLUTE * self.size + _NORMAL_RELATIVE * np.abs(height)
         )
         if len(others):
             corners = self.vertices[self.faces[faces[others]]]
-            zero = np.abs(barycentric(projected[others], corners)) < _ON_EDGE
-            features[others] = np.array(
-                [Feature.FACE, Feature.EDGE, Feature.VERTEX, Feature.VERTEX]
-            )[zero.sum(axis=1)]
-            # the edge lies opposite to the corner whose coordinate is zero
-            opposite = zero.argmax(axis=1)
-            rows = np.arange(len(others))
-            edge = corners[rows, (opposite + 2) % 3] - corners[rows, (opposite + 1) % 3]
-            edge /= np.linalg.norm(edge, axis=1, keepdims=True)
-            edges[others] = np.where((features[others] == Feature.EDGE)[:, None], edge, 0.0)
+            starts = corners[:, _NEXT]
+            along = corners[:, _LAST] - starts  # the edges opposite to the corners
+            across = _cross(along, projected[others, None] - starts)
+            shares = np.einsum("nck,nk->nc", across, normals[others])
+            zero = np.abs(shares) < _ON_EDGE * self._doubled_areas[faces[others], None]
+            count = zero.sum(axis=1)
+            features[others] = _BY_ZEROS[count]
+            on_edge = count == 1  # opposite to the corner whose barycentric coordinate is zero
+            edge = along[on_edge, zero[on_edge].argmax(axis=1)]
+            edges[others[on_edge]] = edge / np.linalg.norm(edge, axis=1, keepdims=True)
         return features, edges
 
 
@@ -211,8 +213,8 @@ def _faces(values: Any, n_vertices: int) -> np.ndarray:
     return np.ascontiguousarray(given, dtype=np.int64)
 
 
-def _unit_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(F, 3); InputError for faces without area."""
+def _unit_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(F, 3), and twice the areas (F,); InputError for faces without area."""
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     normals = np.cross(b - a, c - a)
     lengths = np.linalg.norm(normals, axis=1)
@@ -221,4 +223,4 @@ def _unit_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     if bad.any():
         row = int(bad.argmax())
         raise InputError("a face without area", field=f"faces[{row}]", value=faces[row].tolist())
-    return normals / lengths[:, None]
+    return normals / lengths[:, None], lengths

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..errors import SimulationFailure
 from ..rods.rotations import exp_so3
@@ -213,19 +214,37 @@ class Scene:
             return state
         pinned, at = self.pinned[:n].reshape(-1, 2, 3), self.initial
         rotations = state.rotations.copy()
-        fixed = pinned[:, 1].all(axis=1)
+        fixed, hinged, axes = self._held_bodies
         rotations[fixed] = at.rotations[fixed]
-        for body in np.flatnonzero(pinned[:, 1].sum(axis=1) == 2).tolist():
+        # the axis that each of them may turn about, as it was and as it is
+        was, now = (of.rotations[hinged, :, axes] for of in (at, state))
+        tilted = np.abs(np.einsum("bi,bi->b", was, now) - 1.0) > _ROUND_OFF
+        for body, k in zip(hinged[tilted].tolist(), axes[tilted].tolist()):
             turn = at.rotations[body].T @ state.rotations[body]
-            k = int(np.argmin(pinned[body, 1]))
-            if abs(turn[k, k] - 1.0) > _ROUND_OFF:
-                i, j = (k + 1) % 3, (k + 2) % 3
-                angle = np.arctan2(turn[j, i] - turn[i, j], turn[i, i] + turn[j, j])
-                rotations[body] = at.rotations[body] @ exp_so3(angle * np.eye(3)[k])
+            i, j = (k + 1) % 3, (k + 2) % 3
+            angle = np.arctan2(turn[j, i] - turn[i, j], turn[i, i] + turn[j, j])
+            rotations[body] = at.rotations[body] @ exp_so3(angle * np.eye(3)[k])
         return State(
             np.where(pinned[:, 0], at.positions, state.positions),
             rotations,
             np.where(self.pinned[n:], at.angles, state.angles),
+        )
+
+    @cached_property
+    def _held_bodies(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Bodies that can't turn, those that may turn about one of their axes only, and that
+        axis."""
+        pinned = self.pinned[: 6 * self.n_bodies].reshape(-1, 2, 3)[:, 1]
+        hinged = np.flatnonzero(pinned.sum(axis=1) == 2)
+        return np.flatnonzero(pinned.all(axis=1)), hinged, np.argmin(pinned[hinged], axis=1)
+
+    @cached_property
+    def driven_map(self) -> sp.csr_matrix:
+        """d(driven unknowns)/dq (m, n_parameters)."""
+        d = self.driven
+        return sp.csr_matrix(
+            (d.factors, (np.arange(len(d.dofs)), d.parameters)),
+            shape=(len(d.dofs), self.n_parameters),
         )
 
     def hinge_turns(self, angles: np.ndarray) -> np.ndarray:

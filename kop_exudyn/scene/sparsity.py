@@ -126,6 +126,44 @@ def _find(scene: Scene) -> Sparsity:
     )
 
 
+class ParameterPattern:
+    """Where derivatives of the gradient in the parameters go: found once a scene.
+
+    elements (m,) : whose rest lengths depend on a parameter
+    kept (m, 14) : which of their unknowns are kept
+    rows, columns : kept unknowns and parameters of the entries that come by way of the lengths
+    """
+
+    def __init__(self, scene: Scene, sparsity: Sparsity):
+        s = sparsity
+        self.elements = np.flatnonzero(scene.length_parameter >= 0)
+        rows = s.rows[self.elements]
+        self.kept = rows >= 0
+        columns = np.broadcast_to(scene.length_parameter[self.elements][:, None], rows.shape)
+        self.rows, self.columns = rows[self.kept], columns[self.kept]
+        # the Hessian's columns of driven unknowns, each for the one parameter that drives it
+        driven = scene.driven
+        self._factors = driven.factors[s.driven_column]
+        rows = np.concatenate([self.rows, s.indices[s.n_factor_values :]])
+        columns = np.concatenate([self.columns, driven.parameters[s.driven_column]])
+        self._shape = s.n_free, scene.n_parameters
+        self._free = np.flatnonzero(rows < s.n_free)
+        keys, self._slots = np.unique(
+            columns[self._free].astype(np.int64) * s.n_free + rows[self._free], return_inverse=True
+        )
+        self._indices = (keys % max(s.n_free, 1)).astype(np.int32)
+        self._starts = np.searchsorted(
+            keys, np.arange(scene.n_parameters + 1, dtype=np.int64) * s.n_free
+        ).astype(np.int32)
+
+    def matrix(self, by_lengths: np.ndarray, in_driven: np.ndarray) -> sp.csc_matrix:
+        """d(gradient)/dq (n_free, n_parameters), from the entries by way of the lengths and the
+        Hessian's in the driven columns, `values[n_factor_values:]`."""
+        values = np.concatenate([by_lengths, in_driven * self._factors])[self._free]
+        data = np.bincount(self._slots, values, minlength=len(self._indices))
+        return sp.csc_matrix((data, self._indices, self._starts), shape=self._shape)
+
+
 def element_dofs(scene: Scene) -> np.ndarray:
     """(E, 14) unknowns of each element; n_dofs stands for "no hinge"."""
     hinge = np.where(scene.node_hinge >= 0, 6 * scene.n_bodies + scene.node_hinge, scene.n_dofs)

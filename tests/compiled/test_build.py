@@ -90,7 +90,10 @@ def test_a_package_that_can_not_be_written_is_built_in_the_users_folder(nothing_
 
 def test_addresses_are_of_contiguous_arrays_of_the_right_kind():
     array = np.zeros((4, 4))
-    assert library.address(array) == array.ctypes.data
+    fixed = array.copy()
+    fixed.flags.writeable = False
+    for right in (array, array[1:], array[:0], np.zeros((3, 0)), fixed):
+        assert library.address(right) == right.ctypes.data
     for wrong in (array.T[1:], array[:, :2], array.astype(np.float32), array.astype(int)):
         with pytest.raises(TypeError, match="contiguous"):
             library.address(wrong)

@@ -2,8 +2,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
-from kop_exudyn.scene.sparsity import element_dofs, sparsity_of
+from kop_exudyn.scene.sparsity import ParameterPattern, element_dofs, sparsity_of
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -60,3 +61,26 @@ def test_free_matrix_shares_memory(case_of):
     values[s.diagonal] = 3.0
     assert np.array_equal(matrix.diagonal(), np.full(s.n_free, 3.0))
     assert matrix.nnz == s.n_factor_values
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_derivatives_in_the_parameters_against_a_matrix_of_entries(case_of, seed):
+    """Entries of one place are summed, those of pinned and driven unknowns left out."""
+    scene = case_of(seed).scene
+    s, rng = sparsity_of(scene), np.random.default_rng(seed)
+    pattern = ParameterPattern(scene, s)
+    by_lengths = rng.normal(size=len(pattern.rows))
+    in_driven = rng.normal(size=s.n_values - s.n_factor_values)
+    n = s.n_free + s.n_driven
+    expected = np.zeros((n, scene.n_parameters))
+    np.add.at(expected, (pattern.rows, pattern.columns), by_lengths)
+    upper = sp.csc_matrix(
+        (in_driven, s.indices[s.n_factor_values :], s.indptr[s.n_free :] - s.n_factor_values),
+        shape=(n, s.n_driven),
+    )
+    expected += upper @ scene.driven_map
+    found = pattern.matrix(by_lengths, in_driven)
+    assert found.has_canonical_format
+    np.testing.assert_allclose(found.toarray(), expected[: s.n_free], rtol=1e-14, atol=1e-14)
+    kept = s.rows[pattern.elements]
+    assert np.array_equal(pattern.rows, kept[kept >= 0])
