@@ -7,6 +7,7 @@ import logging
 import os
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +38,7 @@ def library() -> ctypes.CDLL | None:
     return None
 
 
-_START = ctypes.c_char * 0  # of a buffer
+_START: Any = ctypes.c_char * 0  # of a buffer
 
 
 def address(
