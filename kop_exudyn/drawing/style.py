@@ -10,9 +10,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import matplotlib
+from matplotlib.artist import Artist
+from matplotlib.axis import Axis
 from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from matplotlib.ticker import FixedFormatter, FuncFormatter
 from PIL import Image
 
 from ..files.files import write_bytes
@@ -108,9 +111,21 @@ def figure_bytes(figure: Figure, suffix: str) -> bytes:
 def show_dollars(figure: Figure) -> None:
     """Let texts with dollar signs that are not this project's own formulas, as the names of
     designs may have them, be drawn as they are; matplotlib would read, or fail to read, TeX."""
-    for text in figure.findobj(Text):
+    for text in _texts(figure):
         if "$" in _FORMULA.sub("", text.get_text()):
             text.set_parse_math(False)
+
+
+def _texts(artist: Artist) -> Iterator[Text]:
+    """The texts of a figure; those of ticks only where a name may be one: numbers have no dollar
+    signs, and to make all ticks takes as long as to draw them."""
+    if isinstance(artist, Text):
+        yield artist
+    named = not isinstance(artist, Axis) or isinstance(
+        artist.get_major_formatter(), (FixedFormatter, FuncFormatter)
+    )
+    for child in artist.get_children() if named else (artist.label, artist.offsetText):
+        yield from _texts(child)
 
 
 def with_palette(png: bytes, colours: int) -> bytes:

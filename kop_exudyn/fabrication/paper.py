@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_pdf import PdfPages
-from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from ..drawing.labels import text_extent
+from ..drawing.lines import draw_lines
 from ..drawing.style import FAINT, INK, QUIET, WARNING, show_dollars, style
 from ..errors import InputError
 from ..files.files import write_bytes
@@ -71,7 +71,7 @@ class Page:
         return self.high - self.low
 
     def line(self, points: Any, colour: str = INK, width: float = 0.25, **options: Any) -> None:
-        """A line through points (n, 2); width in mm, options as of a LineCollection."""
+        """A line through points (n, 2); width in mm, options as of a PathPatch."""
         key = (colour, width * 72 * _MM, *sorted(options.items()))
         self._lines.setdefault(key, []).append(np.asarray(points, float))
 
@@ -84,8 +84,7 @@ class Page:
     def finish(self) -> Figure:
         """The figure, with all lines: collected, they are drawn much faster than one by one."""
         for (colour, width, *options), lines in self._lines.items():
-            collection = LineCollection(lines, colors=colour, linewidths=width, **dict(options))
-            self.ax.add_collection(collection, autolim=False)
+            draw_lines(self.ax, lines, colour, width, **dict(options))
         self._lines.clear()
         return self.figure
 

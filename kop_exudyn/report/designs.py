@@ -14,15 +14,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
+from ..drawing.lines import draw_lines
 from ..drawing.style import FAINT, QUIET, deviation_colours, style
 
 _ELEVATION, _AZIMUTH = np.radians(38.0), np.radians(-62.0)  # curvature in both directions shows
 _WIDTH = 3.1  # inches of one state
 _NEAR, _FAR = 0.13, 0.62  # grey of the nearest and the farthest rods: a cue for depth
+_GREYS = 32  # of these that are told apart
 
 
 @dataclass(frozen=True)
@@ -153,9 +154,7 @@ def _draw_state(
     room = 0.12 * (top - bottom)  # for the name above and the figures below
     ax.set(xlim=(left, right), ylim=(bottom - room, top + room), aspect="equal")
     if wanted:
-        ax.add_collection(
-            LineCollection([project(chain)[0] for chain in wanted], colors=FAINT, linewidths=0.7)
-        )
+        draw_lines(ax, [project(chain)[0] for chain in wanted], FAINT, 0.7)
     _draw_rods(ax, state.chains, view)
     places, depths = project(state.joints)
     order = np.argsort(-depths)  # nearer joints over farther ones
@@ -193,16 +192,11 @@ def _draw_rods(ax: Axes, chains: Sequence[np.ndarray], view: _View) -> None:
     depth = depths.reshape(-1, 2).mean(axis=1)
     order = np.argsort(-depth)
     share = (depth[order] - view.near) / (view.far - view.near or 1.0)
-    greys = np.repeat((_NEAR + (_FAR - _NEAR) * np.clip(share, 0, 1))[:, None], 3, axis=1)
-    ax.add_collection(
-        LineCollection(
-            places.reshape(-1, 2, 2)[order],
-            colors=greys,
-            linewidths=1.0,
-            capstyle="round",
-            zorder=2,
-        )
-    )
+    levels = np.round(np.clip(share, 0, 1) * (_GREYS - 1))
+    lines = places.reshape(-1, 2, 2)[order]
+    for level in np.unique(levels)[::-1]:  # in the same order: the farther, the lighter
+        grey = _NEAR + (_FAR - _NEAR) * level / (_GREYS - 1)
+        draw_lines(ax, lines[levels == level], str(grey), 1.0, capstyle="round")
 
 
 def _colour_bar(figure: Figure, norm: Normalize, quantity: str, beyond: bool) -> None:

@@ -8,10 +8,10 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
+from kop_exudyn.drawing.lines import draw_lines
 from kop_exudyn.drawing.style import FAINT, PALETTE, QUIET, style
 from kop_exudyn.fabrication.pieces import DesignPieces
 from kop_exudyn.fabrication.placement import PlacedPieces
@@ -110,16 +110,16 @@ def _draw_changed(ax: Axes, placed: PlacedPieces, state: Mapping[str, Any]) -> N
     lines = [places[scene.node_body[chain.nodes]] for chain in scene.chains]
     other = [parameter in changed for parameter in scene.chain_parameters.tolist()]
     for kept in (True, False):  # changed ones above the others
-        ax.add_collection(
-            LineCollection(
-                [line for line, is_other in zip(lines, other) if is_other != kept],
-                colors=FAINT if kept else PALETTE["vermillion"],
-                linewidths=1.0 if kept else 1.8,
-            )
+        draw_lines(
+            ax,
+            [line for line, is_other in zip(lines, other) if is_other != kept],
+            FAINT if kept else PALETTE["vermillion"],
+            1.0 if kept else 1.8,
         )
     corners = [corner.body for parameter, corner in placed.corners.items() if parameter in changed]
     ax.plot(*places[corners].T, "o", color=PALETTE["blue"], markersize=2.6)
     ax.set_aspect("equal")
+    ax.update_datalim(np.concatenate(lines))
     ax.autoscale_view()
 
 

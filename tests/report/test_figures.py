@@ -4,7 +4,8 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import LineCollection, PathCollection
+from matplotlib.collections import PathCollection
+from matplotlib.patches import PathPatch
 
 from kop_exudyn.drawing.style import deviation_colours, figure_bytes, save_figure
 from kop_exudyn.errors import InputError
@@ -28,6 +29,12 @@ def text_of(figure) -> str:
     return "\n".join(texts)
 
 
+def lines_of(ax):
+    """The lines that are drawn together, one list each."""
+    paths = [one.get_path() for one in ax.get_children() if isinstance(one, PathPatch)]
+    return [np.split(p.vertices, np.flatnonzero(p.codes == p.MOVETO)[1:]) for p in paths]
+
+
 class TestDesigns:
     designs = [
         DrawnDesign("one", [drawn("direct", 0.5, 8.0), drawn("assigned", 0.4, 2.0)], arch(0.4)),
@@ -39,14 +46,23 @@ class TestDesigns:
     def test_rods_joints_and_words(self):
         figure = draw_designs(self.designs)
         panels = figure.axes[:4]
-        rods = [c for c in panels[0].collections if isinstance(c, LineCollection)]
+        wanted, *rods = lines_of(panels[0])
         # wanted shape by rod, drawn state by element
-        assert [len(c.get_segments()) for c in rods] == [2, 16]
+        assert len(wanted) == 2 and sum(map(len, rods)) == 16
         joints = next(c for c in panels[0].collections if isinstance(c, PathCollection))
         assert sorted(joints.get_array()) == [0.0, 1.0, 8.0]
         words = text_of(figure)
         for word in ("one", "two", "direct", "assigned", "max 8 %", "mean 3 %", "it buckles"):
             assert word in words
+
+    def test_the_farther_is_lighter_and_drawn_first(self):
+        rods = [
+            patch
+            for patch in draw_designs(self.designs).axes[0].get_children()
+            if isinstance(patch, PathPatch)
+        ][1:]
+        greys = [patch.get_edgecolor()[0] for patch in rods]
+        assert len(greys) > 3 and greys == sorted(greys, reverse=True)
 
     def test_one_scale_of_colours_for_all(self):
         figure = draw_designs(self.designs)
@@ -61,8 +77,8 @@ class TestDesigns:
     def test_everything_lies_within_its_panel(self):
         figure = draw_designs(self.designs)
         for ax in figure.axes[:4]:
-            for lines in (c for c in ax.collections if isinstance(c, LineCollection)):
-                points = np.concatenate(lines.get_segments())
+            for lines in lines_of(ax):
+                points = np.concatenate(lines)
                 assert np.all(
                     (points >= [ax.get_xlim()[0], ax.get_ylim()[0]])
                     & (points <= [ax.get_xlim()[1], ax.get_ylim()[1]])
