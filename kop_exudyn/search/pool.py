@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import logging
 import os
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from time import sleep
 from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
 
 from threadpoolctl import threadpool_limits
@@ -25,6 +27,8 @@ log = logging.getLogger(__name__)
 P = ParamSpec("P")
 T = TypeVar("T")
 
+_WATCH_S = 1.0  # between two looks whether the parent is there
+
 # Filled in every worker by its initializer: the designs, and the objectives made of them so far.
 _designs: list[Design] = []
 _objectives: dict[tuple[int, Weights, Requirements], DesignObjective] = {}
@@ -35,10 +39,24 @@ def _initialise(designs: list[Design]) -> None:
     _objectives.clear()
 
 
-def _start_worker(designs: list[Design], extensions: Mapping[str, Mapping[str, Any]]) -> None:
+def _start_worker(
+    designs: list[Design],
+    extensions: Mapping[str, Mapping[str, Any]],
+    parent: int | None = None,
+) -> None:
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     one_thread()
     adopt(extensions)
     _initialise(designs)
+
+
+def _end_with(parent: int) -> None:
+    """End this process when its parent is gone: of one that was killed, workers would wait for
+    ever to be rid of their results."""
+    while os.getppid() == parent:
+        sleep(_WATCH_S)
+    os._exit(1)
 
 
 def one_thread() -> threadpool_limits:
@@ -195,7 +213,7 @@ class DesignPool:
             n_jobs=self.jobs,
             backend="loky",
             initializer=_start_worker,
-            initargs=(self.designs, registered_elsewhere()),
+            initargs=(self.designs, registered_elsewhere(), os.getpid()),
             batch_size=1,
             pre_dispatch="all",
         )

@@ -3,6 +3,13 @@ and when."""
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
+from itertools import count
+from time import sleep
+
 import pytest
 import scipy.linalg  # noqa: F401  # whose BLAS has to be there before its threads are counted
 from support.grids import coarse_grid
@@ -67,3 +74,59 @@ def test_one_thread_for_the_blas_while_designs_are_solved(repository):
             assert set(threads().values()) == {1}
         # others may have been loaded meanwhile
         assert {library: threads()[library] for library in before} == before
+
+
+BUSY = """
+import os, sys, time
+from pathlib import Path
+from kop_exudyn.io.datasets import load_designs
+from kop_exudyn.search.pool import DesignPool
+from kop_exudyn.search.weights import Weights
+
+def large(objective, out):
+    Path(out, str(os.getpid())).touch()
+    while Path(out, "wait").exists():
+        time.sleep(0.05)
+    return bytes(10_000_000)  # more than a pipe holds
+
+designs = load_designs(sys.argv[1])[:2]
+with DesignPool(designs, 2) as pool:
+    pool.prepare()
+    pool.map(large, Weights.suiting(designs), {0: (sys.argv[2],), 1: (sys.argv[2],)})
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a killed process has no sign there")
+def test_workers_end_with_their_parent(repository, tmp_path):
+    """Killed while they had results for it, it left them behind for ever."""
+
+    def alive(pid: int) -> bool:
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return False
+        return True
+
+    def wait_for(there) -> None:
+        for turn in count():
+            if there():
+                return
+            assert turn < 1200  # of 0.1 s: a busy machine may take long
+            sleep(0.1)
+
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "wait").touch()
+    command = [sys.executable, "-c", BUSY, str(repository / "models" / "small"), str(out)]
+    parent = subprocess.Popen(command)
+    wait_for(lambda: parent.poll() is not None or len(list(out.iterdir())) == 3)
+    workers = [int(file.name) for file in out.iterdir() if file.name != "wait"]
+    try:
+        assert len(workers) == 2 and all(map(alive, workers))
+        parent.send_signal(signal.SIGKILL)
+        parent.wait()
+        (out / "wait").unlink()
+        wait_for(lambda: not any(map(alive, workers)))
+    finally:
+        for pid in filter(alive, workers):
+            os.kill(pid, signal.SIGKILL)
