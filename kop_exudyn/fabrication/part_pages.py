@@ -20,6 +20,8 @@ from .templates import plate_template, strip_template
 
 _COLOURS = {CUT: INK, ENGRAVE: QUIET, NOTES: FAINT}
 _DIMENSION = 6.0  # points
+_SHORT, _ROW = 5.5, 2.9  # points, and mm of a page, of what stands under short pieces
+_ASIDE = 2  # of such texts that may stand beside their pieces' span, rather than in one more row
 _STEP = 3.0  # mm between dimensions that stand side by side
 _NUMBERS = 14.0  # mm of a page for the numbers of bars
 _STRIPS_A_PAGE = 5  # at least, where the paper is high enough
@@ -143,15 +145,14 @@ def stock_pages(book: Book, blanks: Blanks, plan: StockPlan | None) -> None:
     page, y = None, 0.0
     for alike in _runs([(bar.length, bar.pieces) for bar in plan.bars]):
         bar = plan.bars[alike[0]]
-        if page is None or y - 11.0 < page.low[1]:
+        if page is None or y - 17.0 < page.low[1]:
             page = book.page(f"Bars to saw, {blanks.board.section} mm", scale)
             noted = page.note(
                 f"{counted(len(plan.bars), 'bar')}: {_lengths(plan)}; "
                 f"{plan.length / 1000:.2f} m in all, "
                 f"{100 * plan.used:.0f} % of it used; no plan needs less than "
                 f"{plan.least / 1000:.2f} m. "
-                f"Kerf {blanks.options.kerf:g} mm. Saw from the left; lengths in mm: those of "
-                "pieces too short for it are in the cut list.",
+                f"Kerf {blanks.options.kerf:g} mm. Saw from the left; lengths in mm.",
             )
             y = page.high[1] - noted - 2.0
         y -= 10.0
@@ -168,6 +169,7 @@ def stock_pages(book: Book, blanks: Blanks, plan: StockPlan | None) -> None:
             ],
             QUIET,
         )
+        short: list[tuple[float, str]] = []  # middles of pieces without room, and what is below
         for label, length in bar.pieces:
             step = length / scale
             page.ax.fill(
@@ -179,9 +181,12 @@ def stock_pages(book: Book, blanks: Blanks, plan: StockPlan | None) -> None:
             )
             text = f"{label}  {tenths(length)}"
             if text_extent(text, 6.5)[0] > step - 1:
-                text = label
+                named = text_extent(label, 6.5)[0] <= step - 0.5
+                short.append((x + step / 2, tenths(length) if named else text))
+                text = label if named else ""
             page.text(x + step / 2, y + 1.9, text, 6.5, ha="center", va="center")
             x += step + blanks.options.kerf / scale
+        below = _below(page, short, y) if short else 0.0
         page.text(
             page.low[0] + _NUMBERS + 2.0 + bar.length / scale,
             y + 2.0,
@@ -192,6 +197,30 @@ def stock_pages(book: Book, blanks: Blanks, plan: StockPlan | None) -> None:
             va="center",
             color=QUIET,
         )
+        y -= below
+
+
+def _below(page: Page, texts: Sequence[tuple[float, str]], y: float) -> float:
+    """Texts under a bar's lower edge at y, in as many rows as they need to be near; the room taken,
+    mm.
+
+    texts : the middles of what they are about, mm on the page, from left to right, and they
+    """
+    wide = max(text_extent(text, _SHORT)[0] for _, text in texts) + 1.5
+    low, high = page.low[0] + wide / 2, page.high[0] - wide / 2
+    span = min(texts[-1][0] - texts[0][0] + _ASIDE * wide, high - low)
+    rows = int(np.ceil((len(texts) - 1) * wide / span)) or 1
+    apart = wide / rows
+    places = _spread([middle for middle, _ in texts], apart)
+    least = low + apart * np.arange(len(texts))
+    places = np.maximum(places - max(places[-1] - high, 0.0), least)
+    for number, ((middle, text), place) in enumerate(zip(texts, places)):
+        under = y - _ROW * (1 + number % rows)
+        page.line(
+            [[middle, y], [middle, y - 0.6], [place, y - 1.6], [place, under + 1.1]], QUIET, 0.1
+        )
+        page.text(place, under, text, _SHORT, ha="center", va="center")
+    return _ROW * rows + 0.5
 
 
 def _lengths(plan: StockPlan) -> str:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from kop_exudyn.drawing.labels import text_extent
 from kop_exudyn.fabrication.blanks import Blanks
@@ -56,7 +57,7 @@ def test_bars_that_are_alike_are_drawn_once(parts):
         and "21" in told
         and len(book.pages) == 1
     )
-    assert sum("4.0" in text or text == "L1" for text in told) == 1
+    assert told.count("L1") == told.count("4.0") == 1
 
 
 def test_bars_of_several_lengths_are_told_apart(parts):
@@ -67,6 +68,25 @@ def test_bars_of_several_lengths_are_told_apart(parts):
     told = texts(book)
     assert any("4 bars: 1 of 50 mm, 3 of 20 mm; 0.11 m in all" in text for text in told)
     assert "of 50, left 10" in told and "of 20, 3 alike, left 5" in told
+
+
+@pytest.mark.parametrize("number", [3, 12, 40])
+def test_lengths_of_pieces_without_room_stand_below(parts, number):
+    """Apart from each other and on the page; those with room for it keep theirs."""
+    blanks, book = Blanks(parts, "m"), Book("a4", "kit")
+    pieces = (("L1", 900.0), *((f"L{k + 2}", 5.0 + 0.3 * k) for k in range(number)))
+    stock_pages(book, blanks, StockPlan((Bar(2400.0, pieces, 0.0),) * 2, 4800.0))
+    (page,) = book.pages
+    assert "L1  900.0" in texts(book)
+    below = [text for text in page.ax.texts if text.get_size() == 5.5]
+    # with their labels, for which there is no room either
+    assert [t.get_text() for t in below] == [f"{label}  {x:.1f}" for label, x in pieces[1:]]
+    figure = page.finish()
+    FigureCanvasAgg(figure)
+    boxes = [text.get_window_extent() for text in below]
+    assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
+    left, right = page.ax.transData.transform([[page.low[0], 0.0], [page.high[0], 0.0]])[:, 0]
+    assert all(left - 1 <= box.x0 and box.x1 <= right + 1 for box in boxes)
 
 
 def test_what_is_rounded_to_nothing_has_no_sign():
