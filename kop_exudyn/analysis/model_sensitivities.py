@@ -32,7 +32,7 @@ from ..scene.state import State
 from ..structures.fitting import TargetFitting
 from ..structures.load_bound import with_places
 from ..structures.loading import acting_loads, held_scene
-from ..structures.loads import LoadCase, tributary_areas
+from ..structures.loads import LoadCase
 from ..structures.strength import materials_of
 from ..structures.stress_bound import places_of
 from .simulation import SimulationResult
@@ -266,7 +266,7 @@ class ModelSensitivities:
             found["line"] = gradient.weight.sum(axis=0) + self._along("line", gradient)
         if "area" in self._acting:
             moved = gradient.forces[self._acting["area"][0]]
-            areas = tributary_areas(self._design.target.positions)
+            areas = self._design.joint_areas
             for name, own, vector in zip(("area", "plan"), areas, (case.area, case.plan)):
                 if vector is not None:
                     found[name] = own @ moved

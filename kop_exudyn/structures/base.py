@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
-from ..arrays import Indices, Parameters, Points, Triangles, Vector
+from ..arrays import Indices, Numbers, Parameters, Points, Triangles, Vector
 from ..errors import InputError, did_you_mean
 from ..geometry.triangles import TriangleSurface
 from ..kit.groups import ElementGroup
@@ -24,7 +24,8 @@ from ..plugins import Registry
 from ..units import Units, units_from_dict
 from ..wording import counted
 from .hardware import CellHardware
-from .loads import LoadCase, load_cases_from_dict
+from .links import joint_links
+from .loads import LoadCase, load_cases_from_dict, tributary_areas
 
 if TYPE_CHECKING:
     from ..equilibrium.equilibria import Equilibrium, Start
@@ -155,6 +156,13 @@ class Design(ABC):
     def target(self) -> Target:
         """The target; may need simulations of the input design, so it is computed at first use and
         kept."""
+
+    @cached_property
+    def joint_areas(self) -> tuple[Numbers, Numbers]:
+        """The areas of the target surface that its joints carry, see `tributary_areas`: the cells
+        are those between the rods. Raises InputError for joints that span no surface."""
+        links = joint_links(self.scene(self.fitted_role.name), self.joints)
+        return tributary_areas(self.target.positions, links)
 
     def report_positions(self, state: State) -> Points:
         """Joint positions (n, 3) in the order, the units and the place of the design's own

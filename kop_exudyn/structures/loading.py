@@ -27,7 +27,7 @@ from ..scene.scene import Scene
 from ..scene.terms import SceneTerm
 from ..wording import counted
 from .base import Design
-from .loads import LoadCase, hold_in_place, tributary_areas
+from .loads import LoadCase, hold_in_place
 from .strength import Strength, material_values, materials_of, rod_strength
 
 _STEPS = 4
@@ -244,7 +244,7 @@ def acting_loads(
         forces = DeadForces(design.joints[case.joints], case.forces)
         acting["forces"] = [Scaled(forces, share)]
     if case.area is not None or case.plan is not None:
-        spread = case.on_joints(*tributary_areas(design.target.positions))
+        spread = case.on_joints(*design.joint_areas)
         acting["area"] = [Scaled(DeadForces(design.joints, spread), share)]
     if case.line is not None:
         own = np.broadcast_to(share * case.line, (len(scene.elements), 3))

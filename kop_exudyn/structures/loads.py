@@ -12,10 +12,10 @@ import numpy as np
 from ..arrays import Indices, Numbers, Points, Vector
 from ..checks import check_positive
 from ..errors import InputError
+from ..geometry.cells import cells_between, shares_of
 
 _STRAIGHT = 1e-3  # points within this share of their extent from a line don't hold a structure
 _SPREAD = ("gravity", "line", "area", "plan")  # loads of three numbers, or None
-_OUTSIDE = 3.0  # median edges: longer triangles span what is outside of a design
 
 
 def hold_in_place(points: Points) -> bool:
@@ -51,32 +51,23 @@ class DeflectionLimit:
         return float(min(own, np.inf if self.span_over is None else span / self.span_over))
 
 
-def tributary_areas(points: Points) -> tuple[Numbers, Numbers]:
+def tributary_areas(points: Points, links: Indices | None = None) -> tuple[Numbers, Numbers]:
     """The areas of a surface that its joints (n, 3) carry: (n,) on the surface, (n,) in plan.
 
-    Each has a third of every triangle of the joints' Delaunay triangulation in the plane that they
-    are nearest to; triangles with an edge longer than three times the median edge lie outside the
-    design and are left out.
+    Each joint has its share of the cells that it is a corner of, see `geometry.cells`.
+
+    links : (m, 2) joints that rods connect: the net's cells lie between these. Default: cells are
+        the triangles between neighbouring joints, and the polygons of those on a circle
 
     Raises InputError for joints that span no surface.
     """
-    from scipy.spatial import Delaunay, QhullError
+    from scipy.spatial import QhullError
 
-    axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2]
     try:
-        corners = Delaunay(points @ axes[:2].T).simplices
+        cells = cells_between(points, links)
     except (QhullError, ValueError):
         raise InputError("joints on a line carry no loads per area", field="loads.area") from None
-    a, b, c = (points[corners[:, k]] for k in range(3))
-    edges = np.linalg.norm(np.stack([b - a, c - b, a - c]), axis=2)
-    inside = edges.max(axis=0) <= _OUTSIDE * np.median(edges)
-    normals = 0.5 * np.cross(b - a, c - a)[inside]
-    found = []
-    for area in (np.linalg.norm(normals, axis=1), np.abs(normals[:, 2])):
-        own = np.zeros(len(points))
-        np.add.at(own, corners[inside], area[:, None] / 3)
-        found.append(own)
-    return found[0], found[1]
+    return shares_of(points, cells)
 
 
 def _times(factor: float, value: np.ndarray | None) -> np.ndarray | None:

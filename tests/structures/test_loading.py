@@ -8,12 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from kop_exudyn.analysis.simulation import simulate
 from kop_exudyn.cli import main
 from kop_exudyn.errors import InputError
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.structures.base import design_from_dict
+from kop_exudyn.structures.links import joint_links
 from kop_exudyn.structures.loading import loaded_state, supports_of
 from kop_exudyn.structures.loads import LoadCase, tributary_areas
 from kop_exudyn.structures.strength import materials_of
@@ -116,19 +120,79 @@ def test_what_is_spread_adds_up(dome, opened):
 
 
 def test_areas_of_joints():
-    """On a tilted grid of squares: corners a quarter, edges a half, middles one, up to the
-    triangulation's choice of diagonals; nothing over a gap."""
+    """On a tilted grid of squares: corners a quarter, edges a half, middles one, by whatever
+    diagonals they were told apart; nothing over a gap."""
     x, y = np.meshgrid(np.arange(6.0), np.arange(5.0))
     slope = np.radians(30)
     points = np.stack([x * np.cos(slope), y, x * np.sin(slope)], axis=-1).reshape(-1, 3)
     surface, plan = tributary_areas(points)
-    assert surface.sum() == pytest.approx(20) and plan.sum() == pytest.approx(20 * np.cos(slope))
-    assert surface.min() >= 1 / 6 - 1e-9
+    rim = ((x == 0) | (x == 5)) * 1 + ((y == 0) | (y == 4))
+    np.testing.assert_allclose(surface, 0.5 ** rim.ravel(), rtol=1e-12)
     np.testing.assert_allclose(plan, np.cos(slope) * surface)
     apart = np.concatenate([points, points + [0, 40, 0]])
     assert tributary_areas(apart)[0].sum() == pytest.approx(40)
     with pytest.raises(InputError, match="on a line"):
         tributary_areas(np.arange(12.0)[:, None] * [1.0, 0, 0])
+
+
+@pytest.mark.parametrize("model", ["grids/01_dome", "conformals/01_sinh", "umbrellas/hill"])
+def test_areas_do_not_depend_on_where_and_in_which_unit(repository, model):
+    """By which diagonal Delaunay's triangles tell a square's corners apart is chance."""
+    design = load_design(repository / "models" / f"{model}.json")
+    x, links = (
+        design.target.positions,
+        joint_links(design.scene(design.fitted_role.name), design.joints),
+    )
+    assert len(links) == {"grids": 144, "conformals": 144, "umbrellas": 12}[model.split("/")[0]]
+    surface, plan = design.joint_areas
+    turn = Rotation.from_rotvec([0, 0, 0.7]).as_matrix()
+    mirrored = x * [-1, 1, 1]
+    for moved, scale in (
+        (1e3 * x, 1e6),
+        (x @ turn.T + [3, 4, 5], 1),
+        (mirrored, 1),
+        (x / 3, 1 / 9),
+    ):
+        own = tributary_areas(moved, links)
+        np.testing.assert_allclose(own[0], scale * surface, rtol=1e-7)
+        np.testing.assert_allclose(own[1], scale * plan, rtol=1e-7)
+    order = np.random.default_rng(0).permutation(len(x))
+    place = np.argsort(order)
+    again = tributary_areas(x[order], place[links])
+    np.testing.assert_allclose(again[0], surface[order], rtol=1e-7)
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 10_000), st.floats(0.0, 0.6))
+def test_areas_of_skewed_nets_are_those_of_their_cells(seed, skew):
+    """Inner joints have about a quarter of each of the four around them, and no third of one."""
+    rng = np.random.default_rng(seed)
+    i, j = np.meshgrid(np.arange(5), np.arange(6), indexing="ij")
+    number = np.arange(30).reshape(5, 6)
+    links = np.concatenate(
+        [
+            np.stack([number[:-1].ravel(), number[1:].ravel()], 1),
+            np.stack([number[:, :-1].ravel(), number[:, 1:].ravel()], 1),
+        ]
+    )
+    points = np.stack([i + skew * j, j, 0 * i], axis=-1).reshape(-1, 3).astype(float)
+    points[:, :2] += 0.02 * rng.normal(size=(30, 2))
+    surface, plan = tributary_areas(points, links)
+    np.testing.assert_allclose(surface, plan)
+    for a, b in zip(*(k.ravel() for k in np.meshgrid([1, 2, 3], [1, 2, 3, 4], indexing="ij"))):
+        around = [(a - 1, b - 1), (a - 1, b), (a, b - 1), (a, b)]
+        quads = [
+            points[[number[p, q], number[p + 1, q], number[p + 1, q + 1], number[p, q + 1]]]
+            for p, q in around
+        ]
+        least = sum(0.2 * _area(q) for q in quads)
+        most = sum(0.3 * _area(q) for q in quads)
+        assert least < surface[number[a, b]] < most
+
+
+def _area(quad):
+    x, y = quad[:, 0], quad[:, 1]
+    return 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
 @pytest.mark.parametrize(
