@@ -30,6 +30,7 @@ _NEW_OBJECTS = 50_000
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 _WRITTEN = ("out", "preview")  # what options and places for files are called that are written
+_OPTION, _NEGATIVE = re.compile(r"--[a-z][a-z-]*"), re.compile(r"-\.?\d")
 _ALIKE = 0.75  # of two names, from where on one may be meant by the other
 
 _DESCRIPTION = (
@@ -118,9 +119,22 @@ def _nearby(path: Path) -> str:
     return f" (did you mean {str(path.parent / stems[near[0]])!r}?)" if near else ""
 
 
+def _with_their_options(argv: Sequence[str]) -> list[str]:
+    """Arguments with values as -1,0,-9.81 and -30deg joined to the options before them, which
+    argparse takes for options of their own."""
+    found: list[str] = []
+    for value in argv:
+        if found and _OPTION.fullmatch(found[-1]) and _NEGATIVE.match(value):
+            found[-1] += f"={value}"
+        else:
+            found.append(value)
+    return found
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run ``kop`` with these arguments (default: those of the process); returns the exit status."""
-    args, unknown = make_parser().parse_known_args(argv)
+    given = sys.argv[1:] if argv is None else argv
+    args, unknown = make_parser().parse_known_args(_with_their_options(given))
     if unknown:
         args.command.refuse(unknown)
     _set_up_logging(args)

@@ -173,7 +173,7 @@ def common_units(named: Mapping[str, Units | None], what: str = "designs") -> Un
     for name, other in given.items():
         if other != units:
             raise InputError(
-                f"{what} that go together need the same units: {first} has {units}, {name} has "
+                f"{what} that go together need the same units: {first} in {units}, {name} in "
                 f"{other} (kop import FILE --unit {units.length} --force-unit {units.force} --out "
                 "NEW writes a design in these)",
                 field="units",

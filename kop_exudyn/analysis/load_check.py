@@ -27,7 +27,8 @@ from ..structures.strength import beyond_limit, materials_of, rod_strength
 from ..structures.thickness import resolved, thickened_scene
 
 _STEPS = 4  # to the factor that is asked for
-_CLOSE = 1 / 64  # of the factor asked for: the critical one is located as well as that
+_CLOSE = 1 / 64  # of the critical factor: it is located as well as that
+_LEAST = 1e-6  # of the factor asked for: a smaller one is none
 _BEYOND = 2.0  # times the factor asked for: so far the critical one is looked for
 _NO_SADDLES = NewtonOptions(escapes=0, soften=False, max_iterations=60)
 _THICKEST = 4.0  # times the present thickness: more is no mending
@@ -93,9 +94,13 @@ class LoadCheck:
     def to_dict(self) -> dict[str, Any]:
         """As result.json has it; None for what was not found or has no limit."""
         deflection = self.deflection
+        held: dict[str, Any] = dict.fromkeys(("supports", "total_force", "reactions"))
+        if self.loaded is not None:
+            state = self.loaded.to_dict()
+            held = {name: state[name] for name in held}
         return {
             "factor": self.case.factor,
-            "supports": None if self.loaded is None else self.loaded.supports.tolist(),
+            **held,
             "deflection": None if np.isnan(deflection) else deflection,
             "deflection_limit": None if self.allowed == np.inf else self.allowed,
             "span": self.span,
@@ -123,7 +128,8 @@ def critical_factor(
     scene: Scene | None = None,
 ) -> float:
     """The largest factor, up to `most`, by which a case's loads may be multiplied so that the
-    unloaded state deforms stably: a lower bound, at most `_CLOSE` of the case's factor below.
+    unloaded state deforms stably: a lower bound, at most a sixty-fourth of itself below; 0 for less
+    than a millionth of the case's factor.
 
     scene : of the unloaded state; default: the design's own
     """
@@ -134,7 +140,7 @@ def critical_factor(
         return solve(system, unloaded.q, start, unloaded.opening, _NO_SADDLES)
 
     here, factor, step = unloaded, 0.0, case.factor / _STEPS
-    while factor < most * (1 - 1e-12) and step >= _CLOSE * case.factor:
+    while factor < most * (1 - 1e-12) and step >= max(_CLOSE * factor, _LEAST * case.factor):
         ahead = min(factor + step, most)
         try:
             found = led(ahead, here)

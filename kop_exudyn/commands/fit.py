@@ -44,13 +44,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from ..analysis.refit import refit
-    from ..files.files import check_output_file
-    from ..files.json_files import write_json
+    from ..files.files import check_ending, check_output_file
+    from ..files.json_files import JSON_ENDINGS, write_json
     from ..io.designs import own_content
     from ..io.rescaling import relocated
     from ..report.kit_run import progress_bar
 
     check_output_file(args.out, overwrite=args.overwrite)
+    check_ending(args.out, JSON_ENDINGS, "--out")
     data = own_content(args.design)
     with progress_bar(not args.quiet) as bar:
         bar.set_description_str(data["name"])

@@ -239,7 +239,7 @@ def run(args: argparse.Namespace) -> int:
     from ..errors import InputError
     from ..exchange.curve_files import CURVE_READERS, is_drawing, is_surface
     from ..exchange.other_formats import instead_of
-    from ..files.files import check_output_file
+    from ..files.files import check_ending, check_output_file
     from ..files.json_files import JSON_ENDINGS
     from ..geometry.mesh_files import MESH_SUFFIXES
     from ..structures.nets import net_class, net_classes
@@ -257,10 +257,7 @@ def run(args: argparse.Namespace) -> int:
         if path is None:
             continue
         check_output_file(path, overwrite=args.overwrite)
-        if not path.name.lower().endswith(endings):
-            raise InputError(
-                f"expected a name that ends in {' or '.join(endings)}", field=field, value=str(path)
-            )
+        check_ending(path, endings, field)
     drawing = is_drawing(args.file)
     surface = args.kind is None and drawing and is_surface(args.file)
     drawn = args.edges or (drawing and not surface)

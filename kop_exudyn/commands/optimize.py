@@ -185,13 +185,11 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(
             "a kit says how many parts there are: give --kit or --parts",
             field="--parts",
-            value=args.parts,
         )
     if args.stock is not None and (args.kit is not None or args.parts):
         raise InputError(
             "a stock says which parts there are: give it without --kit and --parts",
             field="--stock",
-            value=args.stock,
         )
     if args.together and args.stock is None:
         raise InputError("says how a stock is used: give it with --stock", field="--together")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..wording import counted
 from .output import add_json, deviation_text
@@ -16,7 +17,10 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ..structures.base import Design
+    from ..structures.loads import LoadCase
     from ..units import Units
+
+log = logging.getLogger(__name__)
 
 HELP = "deploy one design and say how well it fits its target"
 DESCRIPTION = """Deploys a design, has Exudyn confirm the equilibrium, and reports its energy, its
@@ -79,8 +83,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from dataclasses import replace
-
     from ..analysis.simulation import simulate
     from ..errors import SimulationFailure
     from ..files.json_files import to_json
@@ -94,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
     }
     if args.gravity is not None:
         changes["gravity"] = _gravity(design, args)
-    loads = replace(design.loads, **changes) if changes else None
+    loads = _replaced(design, changes) if changes else None
     try:
         found = simulate(design, loads, engine=args.engine)
         result = found.to_dict()
@@ -108,6 +110,33 @@ def run(args: argparse.Namespace) -> int:
         raise
     sys.stdout.write(to_json(result) if args.json else _summary(result, design.units))
     return 0
+
+
+def _replaced(design: Design, changes: dict[str, Any]) -> LoadCase:
+    """What acts by the command line instead of the file's own loads: load cases of the file are
+    left out, and their supports kept where it names them for all."""
+    from dataclasses import replace
+
+    from ..errors import InputError
+    from ..structures.loads import FILE_LOADS, LoadCase
+
+    own = design.loads
+    others = [case.name for case in design.load_cases if case.name != FILE_LOADS]
+    if others:
+        log.warning(
+            "%s: with loads on the command line the load cases of the file are left out: %s",
+            design.name,
+            ", ".join(others),
+        )
+    if own.name != FILE_LOADS:  # the first of several cases, which says nothing of this one
+        held = {None if c.supports is None else tuple(c.supports) for c in design.load_cases}
+        own = LoadCase(supports=own.supports if len(held) == 1 else None)
+    found = replace(own, **changes)
+    if found.empty:
+        raise InputError(
+            "nothing acts: leave it out", field=", ".join(f"--{name}" for name in changes)
+        )
+    return found
 
 
 def _gravity(design: Design, args: argparse.Namespace) -> np.ndarray:
@@ -140,6 +169,7 @@ def _summary(result: dict, units: Units | None) -> str:
         f"{counted(result['unknowns'], 'unknown')}",
         "deviation": deviation_text(fit, units)
         + (" (kop fit may lower it)" if fit["max_percent"] > OFF_TARGET else ""),
+        "target's size": with_unit(result["target_size"], "length", units, 4),
         "displacement": f"max {result['displaced_percent']:.3g} % from the joints' own places",
         "elastic energy": with_unit(result["elastic_energy"], "energy", units, 6),
         "stable": "yes" if result["stable"] else "no",
@@ -165,9 +195,11 @@ def _summary(result: dict, units: Units | None) -> str:
         f"stress, {role}": _stress(strength, units) for role, strength in result["strength"].items()
     }
     if "loaded" in result:
-        rows |= _under_load(result["loaded"], units)
+        rows |= _under_load(result["loaded"], result["load_cases"], units)
     for name, check in result.get("load_cases", {}).items():
         rows[f"load case {name}"] = _carried(check, units)
+        if name != result.get("loaded", {}).get("case") and check["reactions"]:
+            rows[f"load case {name}"] += f"; {_acting(check, units)}"
     for row in result.get("sensitivities", ()):
         shares = [f"{k} {row[k]:+.2f} %" for k in ("energy", "stress", "deflection") if k in row]
         shares.append(f"deviation {row['deviation']:+.4f} % of the size")
@@ -183,29 +215,40 @@ def _limits(limits: dict) -> str:
     return f"touched by {limits['touched']} of {counted(limits['hinges'], 'joint')}{beyond}"
 
 
-def _under_load(loaded: dict, units: Units | None) -> dict[str, str]:
-    """Rows about the loaded state."""
-    from ..units import unit_of, with_unit
+def _under_load(loaded: dict, checks: dict, units: Units | None) -> dict[str, str]:
+    """Rows about the loaded state; where there are several load cases, they name its own."""
+    from ..units import with_unit
 
     deflection = loaded["deflection"]
-    force = ", ".join(f"{component:.4g}" for component in loaded["total_force"])
-    force = f"({force}) {unit_of('force', units)}"
     largest, mean = (with_unit(deflection[name], "length", units, 3) for name in ("max", "mean"))
-    sizes = [math.dist((0, 0, 0), row) for row in loaded["reactions"] if None not in row]
-    worst = max(sizes, default=None)
-    reactions = (
-        {}
-        if worst is None
-        else {"reactions": f"{with_unit(worst, 'force', units, 4)} at the support with the most"}
-    )
+    of = f", {loaded['case']}" if len(checks) > 1 else ""
+    stable = "yes" if loaded["stable"] else "no"
+    if not loaded["reached"]:
+        critical = checks[loaded["case"]]["critical_factor"]
+        stable = (
+            f"no: it buckles at {critical:.3g} of the load; what is said of the loaded state is "
+            "behind that jump"
+        )
     return {
-        "load": f"{force} in all, held at {counted(len(loaded['supports']), 'joint')}",
-        **reactions,
-        "deflection": f"max {largest} ({deflection['max_percent']:.3g} % of the size), "
+        f"load{of}": _acting(loaded, units),
+        f"deflection{of}": f"max {largest} ({deflection['max_percent']:.3g} % of the size), "
         f"mean {mean} ({deflection['mean_percent']:.3g} %)",
-        "stress, loaded": _stress(loaded["strength"], units),
-        "stable, loaded": "yes" if loaded["stable"] else "no",
+        f"stress, {loaded['case'] if of else 'loaded'}": _stress(loaded["strength"], units),
+        f"stable{of or ', loaded'}": stable,
     }
+
+
+def _acting(loaded: dict, units: Units | None) -> str:
+    """What acts, and what the supports bear."""
+    from ..units import unit_of, with_unit
+
+    force = ", ".join(f"{component:.4g}" for component in loaded["total_force"])
+    text = f"({force}) {unit_of('force', units)} in all, held at "
+    text += counted(len(loaded["supports"]), "joint")
+    sizes = [math.dist((0, 0, 0), row) for row in loaded["reactions"] if None not in row]
+    if sizes:
+        text += f", reactions up to {with_unit(max(sizes), 'force', units, 4)}"
+    return text
 
 
 def _carried(check: dict, units: Units | None) -> str:

@@ -206,6 +206,8 @@ def _message(error: Any) -> str:
         return (
             f"must have at {'least' if error.validator == 'minItems' else 'most'} {limit} entries"
         )
+    if error.validator == "uniqueItems":
+        return "names something twice: leave the second one out"
     if error.validator == "minLength":
         return "must not be empty"
     return _short(error.message)

@@ -11,6 +11,7 @@ import os
 import re
 import tempfile
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
 
 from ..errors import InputError, OccupiedError
@@ -107,6 +108,17 @@ def check_output_file(path: str | Path, *, overwrite: bool = False) -> None:
         raise OccupiedError("exists already", source=path)
     if not os.path.isdir(path.parent):
         raise InputError("can't be written: its folder doesn't exist", source=path)
+
+
+def check_ending(path: Path, endings: Sequence[str], field: str) -> None:
+    """Raise InputError unless a file to write has one of these endings.
+
+    field : of the path, as errors name it
+    """
+    if not path.name.lower().endswith(tuple(endings)):
+        raise InputError(
+            f"expected a name that ends in {' or '.join(endings)}", field=field, value=str(path)
+        )
 
 
 def make_folder(path: str | Path) -> Path:

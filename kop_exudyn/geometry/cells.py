@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from ..arrays import Numbers, Points
 
 _OUTSIDE = 3.0  # median edges: longer triangles span what is outside
+_SLIVER = 0.04  # of the longest edge's square: twice a triangle's area in the plane
 _ON_CIRCLE = 0.02  # rad by which the angles opposite to an edge may miss pi
 _NEXT = [1, 2, 0]
 
@@ -18,7 +19,8 @@ def cells_between(points: Points, links: np.ndarray | None = None) -> list[np.nd
     triangulation in the plane that they are nearest to, joined across edges that are no links
     (m, 2), so that they are those of a net whose rods are the links.
 
-    Triangles with an edge longer than three times the median edge lie outside and are left out.
+    Triangles with an edge longer than three times the median edge lie outside and are left out,
+    and narrow ones along the rim, as there are where it is straight but for rounding.
     Without links, and where these don't bound cells, triangles are joined whose corners lie on one
     circle: by which edge they are told apart is chance then.
 
@@ -32,10 +34,18 @@ def cells_between(points: Points, links: np.ndarray | None = None) -> list[np.nd
     corners, beside = found.simplices.astype(np.int64), found.neighbors
     sides = points[corners[:, _NEXT]] - points[corners]
     lengths = np.linalg.norm(sides, axis=2)
-    inside = lengths.max(axis=1) <= _OUTSIDE * np.median(lengths)
     # all the same way round; neighbour k lies opposite to corner k
     u, v = flat[corners[:, 1]] - flat[corners[:, 0]], flat[corners[:, 2]] - flat[corners[:, 0]]
-    turned = u[:, 0] * v[:, 1] < u[:, 1] * v[:, 0]
+    twice = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    turned = twice < 0
+    inside = lengths.max(axis=1) <= _OUTSIDE * np.median(lengths)
+    longest = np.max([np.sum(w**2, axis=1) for w in (u, v, v - u)], axis=0)
+    narrow = np.abs(twice) < _SLIVER * longest
+    while True:  # from the rim inwards
+        at_rim = ~inside[beside] | (beside < 0)
+        if not (dropped := inside & narrow & at_rim.any(axis=1)).any():
+            break
+        inside[dropped] = False
     corners[turned], beside = corners[turned][:, ::-1], beside.copy()
     beside[turned] = beside[turned][:, ::-1]
     angles = _angles(points[corners])

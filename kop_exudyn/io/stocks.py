@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from ..files.documents import LARGEST_WHOLE, check_envelope, check_range, check_schema
 from ..files.files import read_bytes
 from ..files.json_files import read_json
@@ -103,10 +103,11 @@ def _piece(row: Mapping[str, Any], field: str, path: Path) -> tuple[str, tuple[f
         unknown = [name for name in values if name not in names]
         if missing or unknown:
             raise InputError(
-                f"{kind} parts have the parameters {', '.join(names)}",
+                f"{did_you_mean(unknown[0], names) if unknown else ''}{kind} parts have the "
+                f"parameters {', '.join(names)}",
                 source=path,
-                field=field,
-                value=", ".join(values) or None,
+                field=f"{field}.{unknown[0]}" if unknown else field,
+                value=None if unknown else ", ".join(values) or None,
             )
         values = [values[name] for name in names]
     if len(values) != len(names):

@@ -282,7 +282,9 @@ def check_request(
     units = common_units({design.name: design.units for design in designs})
     if kit is not None:
         given = kit.kit.units if isinstance(kit, Stock) else kit.units
-        units = common_units({"the kit": given, "the designs": units}, "designs and kits")
+        what = "stock" if isinstance(kit, Stock) else "kit"
+        named = {f"the {what}": given, "the designs": units}
+        units = common_units(named, f"designs and {what}s")
     constraints, n_q = settings.stages.constraints, parameter_offsets(designs)[-1]
     if constraints is not None and constraints.A.shape[1] != n_q:
         raise InputError(

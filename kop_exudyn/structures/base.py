@@ -25,7 +25,7 @@ from ..units import Units, units_from_dict
 from ..wording import counted
 from .hardware import CellHardware
 from .links import joint_links
-from .loads import LoadCase, load_cases_from_dict, tributary_areas
+from .loads import FILE_LOADS, LoadCase, load_cases_from_dict, tributary_areas
 
 if TYPE_CHECKING:
     from ..equilibrium.equilibria import Equilibrium, Start
@@ -110,6 +110,8 @@ class Design(ABC):
     load_cases: tuple[LoadCase, ...] = ()
     # Of all its numbers; None where its file names none.
     units: Units | None = None
+    # The file that it was read from, which errors name.
+    source: str | None = None
     # (3,) where the scenes' coordinates begin in those of the design's own file: zero, unless it
     # lies far from the origin (see `geometry.centring`).
     middle: Vector = np.zeros(3)
@@ -358,12 +360,17 @@ def design_from_dict(data: Mapping[str, Any], source: str = "design") -> Design:
     design = reader(near, source)
     if middle.any():
         design.middle = middle
+    design.source = None if source is None else str(source)
     if "units" in data:
         design.units = units_from_dict(data["units"])
     design.origin = design.middle + np.array(data.get("origin", (0.0, 0.0, 0.0)), float)
     cases = load_cases_from_dict(data)
     for case in cases:
         case.check(len(design.joints), source)
+        if case.empty and (case.name != FILE_LOADS or "loads" in data):
+            raise InputError(
+                f"nothing acts in {case.name}: leave it out", source=source, field=case.name
+            )
     if cases:
         design.loads = cases[0]
         design.load_cases = tuple(case for case in cases if not case.empty)

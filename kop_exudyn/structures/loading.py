@@ -160,7 +160,7 @@ def supports_of(design: Design, unloaded: Equilibrium, case: LoadCase) -> np.nda
     if not hold_in_place(x[found]):
         raise InputError(
             "supports on one line don't hold a structure",
-            source=design.name,
+            source=design.source or design.name,
             field="supports",
             value=found.tolist(),
         )
@@ -214,7 +214,7 @@ def held_scene(
     scene : of the unloaded state; default: the design's own
     Raises InputError as `supports_of`, and for joints that don't exist.
     """
-    case.check(len(design.joints), design.name)
+    case.check(len(design.joints), design.source or design.name)
     scene = design.scene(design.fitted_role.name) if scene is None else scene
     supports = supports_of(design, unloaded, case)
     bodies = design.joints[supports]
@@ -255,8 +255,8 @@ def acting_loads(
         density = material_values(scene, materials, "density")
         if not np.isfinite(density).all():
             raise InputError(
-                "self-weight needs the density of every material",
-                source=design.name,
+                "self-weight needs the density of every material: say it there",
+                source=design.source or design.name,
                 field="material.density",
             )
         scene = with_self_weight(scene, density, share * case.gravity)

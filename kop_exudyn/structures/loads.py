@@ -14,6 +14,7 @@ from ..checks import check_positive
 from ..errors import InputError
 from ..geometry.cells import cells_between, shares_of
 
+FILE_LOADS = "loads"  # name of the case that a file's fields "loads" and "supports" make
 _STRAIGHT = 1e-3  # points within this share of their extent from a line don't hold a structure
 _SPREAD = ("gravity", "line", "area", "plan")  # loads of three numbers, or None
 
@@ -102,7 +103,7 @@ class LoadCase:
     joints: Indices = field(default_factory=lambda: np.zeros(0, int))
     forces: Points = field(default_factory=lambda: np.zeros((0, 3)))
     supports: Indices | None = None
-    name: str = "loads"
+    name: str = FILE_LOADS
     factor: float = 1.0
     deflection: DeflectionLimit = DeflectionLimit()
     line: Vector | None = None
@@ -222,7 +223,7 @@ def load_cases_from_dict(data: Mapping[str, Any]) -> tuple[LoadCase, ...]:
     supports = data.get("supports")
     cases = []
     if "loads" in data or supports is not None:
-        cases = [_case(data.get("loads", {}), supports, "loads")]
+        cases = [_case(data.get("loads", {}), supports, FILE_LOADS)]
     for number, entry in enumerate(data.get("load_cases", ())):
         case = _case(entry, supports, entry.get("name", f"case {number + 1}"))
         if case.name in {other.name for other in cases}:

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from support.grids import coarse_grid
 
 from kop_exudyn.analysis.simulation import simulate
 from kop_exudyn.cli import main
@@ -160,6 +161,17 @@ def test_areas_do_not_depend_on_where_and_in_which_unit(repository, model):
     place = np.argsort(order)
     again = tributary_areas(x[order], place[links])
     np.testing.assert_allclose(again[0], surface[order], rtol=1e-7)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-3, 1 / 25.4, 1 / 304.8])
+def test_areas_along_a_straight_rim(scale):
+    """Of a vault: rounding left triangles along the rim, which stood upright there."""
+    x, y = np.meshgrid(np.linspace(-2000, 2000, 5), np.linspace(-2000, 2000, 5))
+    vault = np.stack([x, y, -5.5e-5 * x**2 - 2e-5 * y**2], axis=-1).reshape(-1, 3)
+    surface, plan = tributary_areas(scale * vault)
+    rim = ((x == x.min()) | (x == x.max())) * 1 + ((y == y.min()) | (y == y.max()))
+    np.testing.assert_allclose(plan, (1000 * scale) ** 2 * 0.5 ** rim.ravel(), rtol=1e-9)
+    assert (surface < 1.03 * plan).all()
 
 
 @settings(deadline=None, max_examples=30)
@@ -334,3 +346,96 @@ def test_command_line(repository, capsys):
     with pytest.raises(SystemExit):
         main(["simulate", path, "--gravity", "1,2"])
     assert "expected a number or X,Y,Z" in capsys.readouterr().err
+
+
+CASES = [
+    {"name": "snow", "plan": [0, 0, -2.0], "supports": [0, 4, 20, 24]},
+    {"name": "weight", "gravity": [0, 0, -9.81], "supports": [0, 4, 20, 24]},
+]
+
+
+def simulated(tmp_path, repository, capsys, arguments=(), **fields):
+    """What `kop simulate` says of a coarse dome with more fields, as data and as text."""
+    path = tmp_path / "dome.json"
+    path.write_text(json.dumps({**coarse_grid(repository, "01_dome", 0), **fields}))
+    assert main(["simulate", str(path), *arguments, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert main(["simulate", str(path), *arguments]) == 0
+    return found, capsys.readouterr().out
+
+
+def test_loads_of_the_command_line_replace_the_load_cases(tmp_path, repository, capsys):
+    """Whichever of them is the first, which was added to them once."""
+    forces = [
+        simulated(tmp_path, repository, capsys, ["--line", "3"], load_cases=cases)[0]["loaded"]
+        for cases in (CASES, CASES[::-1])
+    ]
+    alone = simulated(tmp_path, repository, capsys, ["--line", "3"], supports=[0, 4, 20, 24])[0]
+    for loaded in forces:
+        assert loaded["total_force"] == pytest.approx(alone["loaded"]["total_force"])
+        assert loaded["supports"] == [0, 4, 20, 24]
+
+
+@pytest.mark.parametrize("inside", [True, False])
+def test_every_load_case_has_its_reactions(tmp_path, repository, capsys, inside):
+    """With supports of its own, or those of the design."""
+    cases, fields = CASES, {}
+    if not inside:
+        cases = [{k: v for k, v in case.items() if k != "supports"} for case in CASES]
+        fields = {"supports": [0, 4, 20, 24]}
+    found, text = simulated(tmp_path, repository, capsys, load_cases=cases, **fields)
+    assert found["loaded"]["case"] == "snow" and "load, snow" in text
+    for name in ("snow", "weight"):
+        check = found["load_cases"][name]
+        total = np.add(np.sum(check["reactions"], axis=0), check["total_force"])
+        assert np.abs(total).max() < 1e-6 * np.abs(check["reactions"]).max()
+    assert text.count("reactions up to") == 2
+
+
+def test_a_state_behind_a_jump_is_not_stable(tmp_path, repository, capsys):
+    loads = {"points": [{"joint": 12, "force": [0, 0, -1e5]}], "supports": [0, 4, 20, 24]}
+    found, text = simulated(tmp_path, repository, capsys, loads=loads)
+    critical = found["load_cases"]["loads"]["critical_factor"]
+    assert 0 < critical < 1 and found["load_cases"]["loads"]["stable"] is False
+    if "loaded" in found:
+        assert found["loaded"]["stable"] is False and found["loaded"]["reached"] is False
+        assert f"no: it buckles at {critical:.3g} of the load" in text
+
+
+def test_what_is_missing_or_nothing_is_named(tmp_path, repository, capsys):
+    data = coarse_grid(repository, "01_dome", 0)
+    path = tmp_path / "dome.json"
+
+    def refused(*arguments, **fields):
+        path.write_text(json.dumps({**data, **fields}))
+        assert main(["simulate", str(path), *arguments]) == 2
+        return capsys.readouterr().err
+
+    bare = {k: v for k, v in data["material"].items() if k != "density"}
+    assert f"{path}: material.density" in refused("--gravity", material=bare)
+    assert "--gravity: nothing acts" in refused("--gravity", "0")
+    assert "nothing acts" in refused(loads={"gravity": [0, 0, 0]})
+    cases = [{"name": "a", "plan": [0, 0, -1]}]
+    nothing = [{"name": "none", "factors": {"a": 0}}]
+    assert "none: nothing acts" in refused(load_cases=cases, combinations=nothing)
+    assert "names something twice" in refused(supports=[0, 0, 4])
+
+
+def test_negative_values_need_no_sign_of_equality(tmp_path, repository, capsys):
+    down = simulated(tmp_path, repository, capsys, ["--gravity", "-1,0,-9.81"])[0]
+    assert down["loaded"]["gravity"] == [-1, 0, -9.81]
+    up = simulated(tmp_path, repository, capsys, ["--plan", "-5e-1"])[0]
+    assert up["loaded"]["total_force"][2] > 0
+
+
+def test_rods_that_sag_between_joints(repository):
+    """By beam theory; and so few elements that it tells are said."""
+    told = {}
+    for pieces in (2, 16):
+        data = {**coarse_grid(repository, "01_dome", 0), "elements_per_piece": pieces}
+        design = design_from_dict(data)
+        joints = list(range(len(design.joints)))
+        result = simulate(design, LoadCase(line=[0, 0, -200.0], supports=joints), warn=False)
+        told[pieces] = result.loaded.deflections.max(), any("sag" in w for w in result.warnings)
+    assert told[2][1] and not told[16][1]
+    assert 0.88 * told[16][0] < told[2][0] < 0.95 * told[16][0]
