@@ -14,6 +14,7 @@ _FILES = {
     "states' energies and stresses",
     r"elements\.csv": "one line an element: the part that it is made of, and its parameters in "
     "every stage",
+    r"loads\.csv": "one line a design and load case: what it does under it",
     r"joints\.csv": "one line a joint and stage: its place, and its distance from the target",
     r"parts\.csv": "one line a part of the kit",
     r"steps\.csv": "one line an accepted step of the search",
@@ -82,6 +83,15 @@ _COLUMNS = {
     r"step": "number of the step",
     r"value": "of the objective after it",
     r"term_.*": "the objective's terms",
+    r"load_case": "name of the load case",
+    r"factor": "that stress and stability are asked for: the loads times it",
+    r"deflection|deflection_limit": "the largest under the loads themselves, and what is allowed",
+    r"span": "largest distance between two supports",
+    r"critical_factor": "up to which the loads may grow until the design gives way",
+    r"critical_factor_is_larger": "whether it is only known to be at least that",
+    r"stable": "whether it bears the loads times the factor",
+    r"force_[xyz]": "sum of all loads",
+    r"largest_reaction": "force of the support with the most",
     r"seconds_.*": "wall time of that part of the step",
     r"gradient_norm|predicted|actual|damping|radius|length|trials|failures|active|convexified|"
     r"solver|excess|penalty": "figures of the optimiser, see StepRecord in the documentation",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -19,6 +19,7 @@ from ..structures.strength import design_strength
 from .states import DesignState, states_of_kit
 from .vtk import state_fields
 
+_BY_SUPPORT = ("supports", "total_force", "reactions")  # of load cases: no single numbers
 Rows = list[dict[str, Any]]
 
 
@@ -34,14 +35,16 @@ def result_tables(result: KitResult) -> dict[str, Rows]:
     rods : one row a design, state of the last stage and rod element: strains, stress resultants,
         stresses
     steps : one row an accepted step of the optimisation
+    loads : one row a design and load case: what the verdict on it says; only where there are any
     """
-    return {
+    tables = {
         "designs": list(_designs(result)),
         "elements": list(_elements(result)),
         "joints": list(_joints(result)),
         "rods": list(_rods(result)),
         "steps": list(_steps(result)),
     }
+    return {**tables, "loads": loads} if (loads := list(_loads(result))) else tables
 
 
 def _evaluations(result: KitResult) -> Iterator[tuple[str, int, Design, Any]]:
@@ -108,6 +111,24 @@ def _states(
             if name != "element"
         }
     return row
+
+
+def _loads(result: KitResult) -> Iterator[dict[str, Any]]:
+    for design, verdict in zip(result.designs, result.buildable):
+        for case, check in verdict.get("loads", {}).items():
+            total = check.get("total_force") or (None, None, None)
+            yield {
+                "design": design.name,
+                "load_case": case,
+                **{k: v for k, v in check.items() if k not in _BY_SUPPORT},
+                **dict(zip(("force_x", "force_y", "force_z"), total)),
+                "largest_reaction": _largest_force(check.get("reactions")),
+            }
+
+
+def _largest_force(reactions: Sequence[Sequence[float | None]] | None) -> float | None:
+    known = [row for row in reactions or () if None not in row]
+    return float(np.linalg.norm(np.array(known, float), axis=1).max()) if known else None
 
 
 def _elements(result: KitResult) -> Iterator[dict[str, Any]]:

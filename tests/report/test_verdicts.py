@@ -3,6 +3,7 @@ for kits that can be built and for the two that can't."""
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 from dataclasses import replace
@@ -10,6 +11,7 @@ from html import unescape
 
 import pytest
 from support.grids import coarse_grid
+from support.read_me import assert_explained
 
 from kop_exudyn.analysis.verdict import Buildable, Stop
 from kop_exudyn.cli import main
@@ -117,6 +119,16 @@ def test_a_load_that_no_kit_carries(study, capsys):
     assert re.search(r"<dd class=bad>a sack of sand: deflects [\d.]+\xa0mm", page)
     assert re.search(r"<dd>a sack: deflects [\d.]+\xa0mm", page)  # which is carried
     assert "stress under it" in words
+    # for the desk: a table of the loads, whose columns are told
+    desk = file.parent / "export"
+    assert main(["export", str(out), str(file), "--out", str(desk), "--force", "-q"]) == 0
+    table = next(desk.rglob("loads.csv"))
+    with open(table, encoding="utf-8") as lines:
+        rows = {row["load_case"]: row for row in csv.DictReader(lines)}
+    assert set(rows) == {"a sack of sand", "a sack"}
+    assert float(rows["a sack of sand"]["deflection"]) == told["deflection"]
+    assert float(rows["a sack"]["force_z"]) == pytest.approx(-0.02)
+    assert_explained(table.parent)
 
 
 class TestWords:
