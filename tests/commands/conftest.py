@@ -40,6 +40,7 @@ ANSWER = {
         "pieces_max": 0.035,
         "pieces_mean": 0.015,
     },
+    "target_size": 1.0,
     "displaced_percent": 2.5,
     "joints": [[0.0, 0.0, 0.0]],
     "strength": {"deployed": {"equivalent_stress": 3e7, "utilisation": 0.75, "element": 3}},
