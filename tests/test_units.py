@@ -1,8 +1,8 @@
 """Units: what numbers mean, how they are shown, and files that don't go together."""
 
 import json
-import re
 import logging
+import re
 
 import numpy as np
 import pytest
