@@ -10,8 +10,10 @@ this package, and installed packages that name a module in the entry-point group
 
 from __future__ import annotations
 
+import copyreg
 import pkgutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Any, Generic, TypeVar
@@ -19,6 +21,21 @@ from typing import Any, Generic, TypeVar
 ENTRY_POINTS = "kop_exudyn"
 
 T = TypeVar("T")
+
+
+def _cached_property(function: Callable[..., Any], name: str | None) -> cached_property:
+    made = cached_property(function)
+    if name is not None:
+        made.__set_name__(object, name)
+    return made
+
+
+# Classes of scripts are sent to other processes by value; up to Python 3.11 cached properties have
+# a lock, which can't be sent.
+copyreg.pickle(
+    cached_property,
+    lambda one: (_cached_property, (one.func, one.attrname)),
+)
 
 
 class Registry(Generic[T]):

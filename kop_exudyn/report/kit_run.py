@@ -21,7 +21,14 @@ from ..kit.stock import Stock
 from ..search.events import StageEvent
 from ..search.pool import DesignPool
 from ..search.result import KitResult
-from ..search.run import check_request, described_job, digest, kinds_of, optimize_kit
+from ..search.run import (
+    check_request,
+    check_types,
+    described_job,
+    design_digest,
+    kinds_of,
+    optimize_kit,
+)
 from ..search.settings import JobSettings
 from ..structures.base import Design
 from ..structures.serving import served_by
@@ -68,13 +75,14 @@ def optimize_and_report(
     SimulationFailure
         when an input design can't be simulated
     """
+    check_types(designs, kit, settings)
     designs = served_by(designs, kinds_of(parts, kit))
     if kit is None:
         settings = within_workshop(designs, settings)
     check_request(designs, parts, kit, settings)
     job = described_job(designs, parts, kit, settings)
     if not inputs:
-        job |= {"parameters": {design.name: digest(design.parameters) for design in designs}}
+        job |= {"parameters": {design.name: design_digest(design) for design in designs}}
     folder = RunFolder.open(out, Job.of(job, inputs), resume=resume, overwrite=overwrite)
     required = settings.stages.requirements
     verdict = replace(verdict, safety=required.safety)

@@ -29,14 +29,16 @@ T = TypeVar("T")
 
 _WATCH_S = 1.0  # between two looks whether the parent is there
 
-# Filled in every worker by its initializer: the designs, and the objectives made of them so far.
-_designs: list[Design] = []
-_objectives: dict[tuple[int, Weights, Requirements], DesignObjective] = {}
+
+class _Workspace:
+    """The designs, and the objectives made of them so far."""
+
+    def __init__(self, designs: Sequence[Design] = ()):
+        self.designs = list(designs)
+        self.objectives: dict[tuple[int, Weights, Requirements], DesignObjective] = {}
 
 
-def _initialise(designs: list[Design]) -> None:
-    _designs[:] = designs
-    _objectives.clear()
+_workers = _Workspace()  # of a worker, filled by its initializer
 
 
 def _start_worker(
@@ -48,7 +50,7 @@ def _start_worker(
         threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     one_thread()
     adopt(extensions)
-    _initialise(designs)
+    _workers.designs, _workers.objectives = list(designs), {}
 
 
 def _end_with(parent: int) -> None:
@@ -83,19 +85,22 @@ class _Task(Generic[T]):
     arguments: tuple[Any, ...] = ()
 
 
-def _run_task(task: _Task[T]) -> T | Reference | SimulationFailure:
-    """Run in a worker; a failed simulation comes back as data, so that it doesn't end the whole
-    batch."""
+def _run_task(
+    task: _Task[T], workspace: _Workspace | None = None
+) -> T | Reference | SimulationFailure:
+    """Run in a worker, or in the pool's own workspace; a failed simulation comes back as data, so
+    that it doesn't end the whole batch."""
+    own = _workers if workspace is None else workspace
     try:
         if task.reference is None or task.method is None:
-            return reference_of(_designs[task.number])
+            return reference_of(own.designs[task.number])
         key = (task.number, task.weights, task.requirements)
-        if key not in _objectives:
-            design = _designs[task.number]
-            _objectives[key] = DesignObjective(
+        if key not in own.objectives:
+            design = own.designs[task.number]
+            own.objectives[key] = DesignObjective(
                 design, task.weights, task.reference, task.requirements
             )
-        return task.method(_objectives[key], *task.arguments)
+        return task.method(own.objectives[key], *task.arguments)
     except SimulationFailure as failure:
         return failure
 
@@ -121,8 +126,8 @@ class DesignPool:
         self._parallel: Any = None  # joblib's Parallel, which is untyped
         self._cluster: Cluster | None = None
         self._threads: threadpool_limits | None = None
-        if self.jobs == 1:
-            _initialise(self.designs)
+        # pools of several threads have designs of their own each
+        self._workspace = _Workspace(self.designs)
 
     def __enter__(self) -> DesignPool:
         if self.scheduler is not None:
@@ -142,7 +147,7 @@ class DesignPool:
             self._cluster = None
         if self._threads is not None:
             self._threads.restore_original_limits()
-        _initialise([])
+        self._workspace.objectives.clear()
 
     def prepare(self) -> list[Reference]:
         """Simulate all input designs. Raises the first SimulationFailure: a kit needs all of
@@ -190,9 +195,7 @@ class DesignPool:
         if self._cluster is not None:
             return self._cluster.run(_run_task, tasks)
         if self._parallel is None or len(tasks) < 2:
-            if not _designs:
-                _initialise(self.designs)
-            return [_run_task(task) for task in tasks]
+            return [_run_task(task, self._workspace) for task in tasks]
         from joblib import delayed
         from joblib.externals.loky.process_executor import TerminatedWorkerError
 

@@ -139,8 +139,13 @@ class _Derivatives:
 
 
 def _free_to_choose(stages: Stages) -> bool:
-    """Whether elements may take any part of the kit."""
-    return stages.rule.stock is None and not len(stages.dataset.sliding)
+    """Whether elements may take any part of the kit: not so where a user's constraints hold for
+    them, which other parts would break."""
+    return (
+        stages.rule.stock is None
+        and stages.settings.constraints is None
+        and not len(stages.dataset.sliding)
+    )
 
 
 def _ways(

@@ -44,7 +44,7 @@ from .pool import DesignPool
 from .published import published_method
 from .requirements import Requirements
 from .result import KitResult
-from .settings import JobSettings
+from .settings import JobSettings, StageSettings
 from .stage_results import StageResult
 from .stages import Stages
 from .starts import Starts, assigned_from_starts, forgiving_from_starts
@@ -95,8 +95,11 @@ def optimize_kit(
         when an input design can't be simulated
     """
     begin = perf_counter()
+    check_types(designs, kit, settings)
     designs = served_by(designs, kinds_of(parts, kit))
     check_request(designs, parts, kit, settings)
+    if start is not None and not isinstance(start, StageResult):
+        check_start(designs, start)
     if kit is not None:
         given = kit.kit.units if isinstance(kit, Stock) else kit.units
         named = {design.name: design.units for design in designs}
@@ -266,6 +269,52 @@ def kinds_of(parts: Mapping[str, int] | None, kit: Kit | Stock | None) -> list[s
     return list(parts or {}) if given is None else list(given.sizes)
 
 
+def check_types(designs: Sequence[Design], kit: Kit | Stock | None, settings: JobSettings) -> None:
+    """Raise InputError for what is no list of designs, no kit and no settings."""
+    if isinstance(designs, (str, Design)) or not all(isinstance(d, Design) for d in designs):
+        raise InputError("expected a list of designs, see load_design", field="designs")
+    if not len(designs):
+        raise InputError("expected one design or more", field="designs")
+    if twice := {a.name for n, a in enumerate(designs) for b in designs[:n] if a.name == b.name}:
+        raise InputError(
+            "two designs have this name, by which results tell them apart",
+            field="designs",
+            value=sorted(twice)[0],
+        )
+    if kit is not None and not isinstance(kit, (Kit, Stock)):
+        raise InputError("expected a Kit or a Stock, see load_kit", field="kit", value=kit)
+    if not isinstance(settings, JobSettings):
+        raise InputError("expected JobSettings", field="settings", value=type(settings).__name__)
+    if not isinstance(settings.stages, StageSettings):
+        raise InputError(
+            "expected StageSettings", field="settings.stages", value=type(settings.stages).__name__
+        )
+    if settings.weights is not None and not isinstance(settings.weights, Weights):
+        raise InputError(
+            "expected Weights (Weights.of takes names and numbers)",
+            field="settings.weights",
+            value=type(settings.weights).__name__,
+        )
+    weights = settings.design_weights
+    if weights is not None and len(weights) != len(designs):
+        raise InputError(
+            f"are {len(weights)}, for {counted(len(designs), 'design')}", field="design_weights"
+        )
+
+
+def check_start(designs: Sequence[Design], start: Sequence[Sequence[float]]) -> None:
+    """Raise InputError unless there are finite elements (nq,) for each of the designs."""
+    shapes = [np.shape(own) for own in start]
+    if shapes != [design.parameters.shape for design in designs]:
+        raise InputError(
+            "expected the parameters of each design, as its own are",
+            field="start",
+            value=shapes,
+        )
+    if not all(np.isfinite(np.asarray(own, float)).all() for own in start):
+        raise InputError("must be finite", field="start")
+
+
 def check_request(
     designs: Sequence[Design],
     parts: Mapping[str, int] | None,
@@ -337,6 +386,27 @@ def digest(*arrays: np.ndarray) -> str:
     return hashlib.sha256(
         b"".join(np.ascontiguousarray(a, dtype=float).tobytes() for a in arrays)
     ).hexdigest()
+
+
+def design_digest(design: Design) -> str:
+    """SHA-256 of all numbers that a design's states and target depend on. May simulate it, for a
+    target that comes of that, and raise SimulationFailure."""
+    arrays: list[Any] = [design.parameters, design.joints, design.target.positions]
+    arrays += [design.target.surface.vertices]
+    for role in design.roles:
+        scene = design.scene(role.name)
+        arrays += [
+            *(scene.stiffness, scene.rest_strain, scene.length_constant, scene.length_factor),
+            *(scene.node_frame, scene.node_offset, scene.pinned, scene.driven.constants),
+            *(scene.initial.positions, scene.initial.rotations, scene.initial.angles),
+            [np.nan if role.opening is None else role.opening],
+        ]
+    for case in design.load_cases:
+        given = (case.gravity, case.line, case.area, case.plan, case.joints, case.forces)
+        limits = (case.factor, case.deflection.absolute, case.deflection.span_over)
+        numbers = [np.nan if value is None else value for value in (*given, *limits)]
+        arrays += [*numbers, [] if case.supports is None else case.supports]
+    return digest(*(np.asarray(array, float) for array in arrays))
 
 
 def _check_kinds(designs: Sequence[Design], kit: Kit) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 
 from ..checks import check_positive
 from ..errors import InputError
@@ -37,12 +38,15 @@ class Weights:
             check_positive("weights.level", self.level)
         for name, weight in self.of_terms().items():
             term_class(name)
-            if not (isinstance(weight, (int, float)) and 0 <= weight < float("inf")):
+            known = isinstance(weight, Real) and not isinstance(weight, bool)
+            if not (known and 0 <= weight < float("inf")):
                 raise InputError(
                     "a weight is a finite number, not negative",
                     field=f"weights.{name}",
                     value=weight,
                 )
+        if not (isinstance(self.share, Real) and 0 <= self.share <= 1):
+            raise InputError("must lie in [0, 1]", field="weights.share", value=self.share)
 
     @classmethod
     def of(cls, values: Mapping[str, float]) -> Weights:

@@ -57,7 +57,7 @@ class SQPOptions:
     def __post_init__(self) -> None:
         check_choice("hessian", self.hessian, ("exact", "bfgs"))
         for name in ("max_steps", "max_trials", "stall_steps", "raises"):
-            check_whole(name, getattr(self, name), least=name in ("max_trials", "stall_steps"))
+            check_whole(name, getattr(self, name), least=int(name in ("max_trials", "stall_steps")))
         check_not_negative("feasibility", self.feasibility)
         for name in (
             "gradient_tolerance",

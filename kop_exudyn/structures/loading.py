@@ -255,7 +255,7 @@ def acting_loads(
         density = material_values(scene, materials, "density")
         if not np.isfinite(density).all():
             raise InputError(
-                "self-weight needs the density of every material: say it there",
+                "self-weight needs the density of every material, in units of the design",
                 source=design.source or design.name,
                 field="material.density",
             )

@@ -16,6 +16,7 @@ from ..geometry.cells import cells_between, shares_of
 
 FILE_LOADS = "loads"  # name of the case that a file's fields "loads" and "supports" make
 _STRAIGHT = 1e-3  # points within this share of their extent from a line don't hold a structure
+_LIMITS = {"absolute", "span_over"}
 _SPREAD = ("gravity", "line", "area", "plan")  # loads of three numbers, or None
 
 
@@ -105,7 +106,7 @@ class LoadCase:
     supports: Indices | None = None
     name: str = FILE_LOADS
     factor: float = 1.0
-    deflection: DeflectionLimit = DeflectionLimit()
+    deflection: DeflectionLimit = DeflectionLimit()  # or its fields by name
     line: Vector | None = None
     area: Vector | None = None
     plan: Vector | None = None
@@ -119,12 +120,23 @@ class LoadCase:
         ):
             if (value := getattr(self, name)) is not None:
                 try:
-                    object.__setattr__(self, name, np.asarray(value, kind))
+                    given = np.asarray(value)
+                    if kind is int and given.size and not np.issubdtype(given.dtype, np.integer):
+                        raise TypeError(f"joints are whole numbers, got {given.dtype}")
+                    # a copy: results have it when the caller's array has changed
+                    object.__setattr__(self, name, np.array(value, kind))
                 except (OverflowError, TypeError, ValueError) as error:
                     raise InputError(f"expected numbers: {error}", field=f"loads.{name}") from None
         self._check_shapes()
-        if not (np.isfinite(self.factor) and self.factor > 0):
-            raise InputError("must be a positive number", field="loads.factor", value=self.factor)
+        check_positive("loads.factor", self.factor)
+        if not isinstance(self.deflection, DeflectionLimit):
+            if not isinstance(self.deflection, Mapping) or set(self.deflection) - _LIMITS:
+                raise InputError(
+                    "expected a DeflectionLimit, or absolute and span_over",
+                    field="loads.deflection",
+                    value=self.deflection,
+                )
+            object.__setattr__(self, "deflection", DeflectionLimit(**self.deflection))
 
     def _check_shapes(self) -> None:
         for name in _SPREAD:

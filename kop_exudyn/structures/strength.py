@@ -33,7 +33,7 @@ from .base import Design
 
 TRANSVERSE = 1.5  # largest over mean shear stress of a transverse force
 _SAME_STIFFNESS = 1e-9  # relative
-_ROUNDING = 1e-4  # of a limit: a search that keeps to one ends on it, as well as it converges
+_ROUNDING = 5e-6  # of a limit: a search that keeps to one ends on it, as well as it converges
 
 
 def beyond_limit(value: float | None, limit: float = 1.0) -> bool:

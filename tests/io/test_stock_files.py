@@ -68,7 +68,10 @@ def test_a_kits_pieces_are_read_as_they_were_written(units, tmp_path):
         ("", "kind: a column is missing"),
         ("kind,count,l1,l2\nround,1,1,2\n", r"line 2.kind = 'round': unknown kind"),
         ("kind,count,l1\nlinear,1,1\n", r"line 2 = 'l1': linear parts have the parameters l1, l2"),
-        ("kind,count,l1,l2,angle\nlinear,1,1,2,3\n", "line 2 = 'l1, l2, angle'"),
+        (
+            "kind,count,l1,l2,angle\nlinear,1,1,2,3\n",
+            "line 2.angle: linear parts have",
+        ),
         ("kind,count,l1,l2\nlinear,1.5,1,2\n", "line 2, count = '1.5': expected a whole number"),
         ("kind,count,l1,l2\nlinear,-1,1,2\n", "line 2, count = '-1'"),
         ("kind,count,l1,l2\nlinear,1,one,2\n", "line 2, l1 = 'one': expected a finite number"),
