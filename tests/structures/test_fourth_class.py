@@ -61,3 +61,11 @@ def test_results_do_not_depend_on_the_number_of_processes():
 def test_more_parts_than_elements_are_refused():
     with pytest.raises(InputError, match="more parts than elements"):
         optimize_kit(designs(), {"linear": 30}, settings=JobSettings(jobs=1))
+
+
+def test_exudyn_solves_it_as_well():
+    from kop_exudyn.analysis.simulation import simulate
+
+    arch = designs()[0]
+    fast, own = (simulate(arch, engine=engine).joints for engine in ("fast", "exudyn"))
+    assert abs(fast - own).max() < 1e-6 * arch.target.size

@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
+from kop_exudyn.equilibrium import newton
 from kop_exudyn.equilibrium.equilibria import Equilibrium
-from kop_exudyn.equilibrium.newton import solve
 from kop_exudyn.errors import InputError
 from kop_exudyn.kit.groups import ElementGroup
 from kop_exudyn.rods.rotations import rotation_z
 from kop_exudyn.scene.builder import SceneBuilder
 from kop_exudyn.scene.scene import Scene
-from kop_exudyn.structures.base import Design, Role, Target, register_class
+from kop_exudyn.structures.base import Design, Role, Solve, Target, register_class
 
 _SECTION = np.array([1e5, 4e4, 4e4, 0.8, 1.0, 1.0])  # slender: EA L^2 / EI is about 1e5
 
@@ -63,8 +63,11 @@ class Arch(Design):
     def scene(self, role: str = "deployed") -> Scene:
         return self._scene
 
-    def deploy(self, q: np.ndarray | None = None) -> dict[str, Equilibrium]:
-        return {"deployed": solve(self.systems["deployed"], self.parameters if q is None else q)}
+    def deploy(
+        self, q: np.ndarray | None = None, solve: Solve | None = None
+    ) -> dict[str, Equilibrium]:
+        own = newton.solve if solve is None else solve
+        return {"deployed": own(self.systems["deployed"], self.parameters if q is None else q)}
 
     @cached_property
     def target(self) -> Target:
