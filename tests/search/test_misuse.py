@@ -77,6 +77,7 @@ def test_one_name_and_numbers_that_are_none(designs):
 
 def test_a_class_with_cached_properties_in_other_processes(designs, monkeypatch):
     """Of a script, as cloudpickle sends it; up to Python 3.11 they hold a lock."""
+    base.term_names()  # which loads all of them, for the tests that follow too
     monkeypatch.setattr(base.TERMS, "items", dict(base.TERMS.items))
 
     class Total(base.Term):
@@ -107,6 +108,25 @@ def test_a_class_with_cached_properties_in_other_processes(designs, monkeypatch)
     with DesignPool(designs, 2) as pool:
         references = pool.prepare()
     assert len(references) == 2
+
+
+def test_terms_that_can_not_be_registered(monkeypatch):
+    """One called as an own one took its place in every later search."""
+    base.term_names()  # which loads all of them, for the tests that follow too
+    monkeypatch.setattr(base.TERMS, "items", dict(base.TERMS.items))
+    whole = dict.fromkeys(("sees", "value", "gradient", "model"), lambda *given: 0.0)
+    for fields, message in (
+        ({"name": "stress", **whole}, "is a name of this package"),
+        ({"name": "fit", **whole}, "is a name of this package"),
+        ({"name": "share", **whole}, "is a name of this package"),
+        (whole, "needs a name"),
+        ({"name": "mine", "value": lambda *given: 0.0}, "lacks the methods gradient"),
+    ):
+        with pytest.raises(kop.InputError, match=message):
+            base.register_term(type("Mine", (base.Term,), fields))
+    mine = type("Mine", (base.Term,), {"name": "mine", **whole})
+    assert base.register_term(mine) is mine and base.term_class("mine") is mine
+    assert base.register_term(mine) is mine  # as a notebook's cell that runs again
 
 
 def test_a_run_is_not_resumed_with_another_design(designs, tmp_path):

@@ -84,13 +84,32 @@ class Term(ABC):
         """
 
 
+_RESERVED = ("share", "level")  # weights that belong to no term
+
+
+def _is_ours(term: type[Term] | None) -> bool:
+    return term is not None and term.__module__.startswith(__package__.split(".")[0] + ".")
+
+
 TERMS: Registry[type[Term]] = Registry(__package__)
 _Term = TypeVar("_Term", bound=type[Term])
 
 
 def register_term(term: _Term) -> _Term:
-    """Make a term known under its name; decorates the class."""
-    TERMS.add(term.name, term)
+    """Make a term known under its name; decorates the class.
+
+    Raises InputError for a class without a name of its own or without all of the methods.
+    """
+    name, missing = getattr(term, "name", None), sorted(getattr(term, "__abstractmethods__", ()))
+    if not isinstance(name, str) or not name:
+        raise InputError("a term needs a name", field=f"{term.__name__}.name", value=name)
+    if missing:
+        raise InputError(f"lacks the methods {', '.join(missing)}", field=term.__name__)
+    if not _is_ours(term) and (name in _RESERVED or _is_ours(TERMS.get(name))):
+        raise InputError(
+            "is a name of this package: choose another", field=f"{term.__name__}.name", value=name
+        )
+    TERMS.add(name, term)
     return term
 
 
