@@ -26,6 +26,7 @@ from ..structures.opening import SAME_STATE
 from ..structures.strength import beyond_limit, materials_of, rod_strength
 from ..structures.thickness import resolved, thickened_scene
 
+_HELD = ("supports", "total_force", "reactions", "largest_reaction")  # of the loaded state
 _STEPS = 4  # to the factor that is asked for
 _CLOSE = 1 / 64  # of the critical factor: it is located as well as that
 _LEAST = 1e-6  # of the factor asked for: a smaller one is none
@@ -73,7 +74,12 @@ class LoadCheck:
     @property
     def stable(self) -> bool:
         """Whether the design deforms stably up to the case's factor."""
-        return self.critical * (1 + 1e-9) >= self.case.factor
+        return _bears(self.critical, self.case.factor)
+
+    @property
+    def borne(self) -> bool:
+        """Whether it does up to the loads themselves."""
+        return _bears(self.critical, 1.0)
 
     @property
     def stiff(self) -> bool:
@@ -94,7 +100,7 @@ class LoadCheck:
     def to_dict(self) -> dict[str, Any]:
         """As result.json has it; None for what was not found or has no limit."""
         deflection = self.deflection
-        held: dict[str, Any] = dict.fromkeys(("supports", "total_force", "reactions"))
+        held: dict[str, Any] = dict.fromkeys(_HELD)
         if self.loaded is not None:
             state = self.loaded.to_dict()
             held = {name: state[name] for name in held}
@@ -193,14 +199,13 @@ def _check(
     span = float(np.linalg.norm(x[:, None] - x[None], axis=2).max())
     most = max(beyond * case.factor, 1.0)
     critical = critical_factor(design, unloaded, case, most, scene)
-    reached = critical * (1 + 1e-9)
     failed: str | None = None
     loaded: LoadedState | None = None
     factored: LoadedState | None = None
     try:
-        if reached >= 1.0:
+        if _bears(critical, 1.0):
             loaded = loaded_state(design, unloaded, case, scene)
-        if reached >= case.factor:
+        if _bears(critical, case.factor):
             factored = (
                 loaded
                 if case.factor == 1.0
@@ -208,7 +213,11 @@ def _check(
             )
     except SimulationFailure as failure:
         failed = str(failure)
-    return LoadCheck(case, loaded, factored, span, critical, reached >= most, failed)
+    return LoadCheck(case, loaded, factored, span, critical, _bears(critical, most), failed)
+
+
+def _bears(critical: float, factor: float) -> bool:
+    return critical * (1 + 1e-9) >= factor
 
 
 def _apart(design: Design, a: Equilibrium, b: Equilibrium) -> float:

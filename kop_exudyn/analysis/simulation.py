@@ -22,6 +22,7 @@ from ..scene.limits import HingeLimits
 from ..structures.base import Design
 from ..structures.deviation import OFF_TARGET, fit_summary
 from ..structures.fitting import FitResult, TargetFitting
+from ..structures.links import joint_links
 from ..structures.loads import LoadCase
 from ..structures.plausibility import design_doubts
 from ..structures.strength import Strength, design_strength, strength_summary
@@ -180,20 +181,21 @@ class SimulationResult:
         Elements of constant curvature, n in a span, miss 1.6 / n^2 of the middle's deflection under
         an even load on two supports.
         """
-        pieces = getattr(self.design, "elements_per_piece", None)
-        if pieces is None:
-            return 0.0
-        scene = self.design.scene(self.design.fitted_role.name)
-        at_joints = np.isin(scene.node_body, self.design.joints)
+        design = self.design
+        scene = design.scene(design.fitted_role.name)
+        bent = [len(chain.elements) for chain in scene.chains if len(chain.elements)]
         largest = loaded.deflections.max()
+        if not bent or not largest or len(joint_links(scene, design.joints)) < len(design.joints):
+            return 0.0  # of other structures than nets, the rods have no corner in the middle
+        at_joints = np.isin(scene.node_body, design.joints)
         between = largest - loaded.deflections[at_joints].max(initial=0.0)
-        return float(1.6 / (2 * pieces) ** 2 * between / largest) if largest else 0.0
+        return float(1.6 / (2 * min(bent)) ** 2 * between / largest)
 
     @property
     def reached(self) -> bool:
         """Whether the loaded state is where the growing load leads to; else the design buckles
         before all of it acts, and that state is one behind the jump."""
-        return not self.checks or self.checks[0].critical * (1 + 1e-9) >= 1.0
+        return not self.checks or self.checks[0].borne
 
     def _loaded(self, loaded: LoadedState) -> dict[str, Any]:
         found = loaded.to_dict()
@@ -303,6 +305,6 @@ def _under_loads(
     try:
         return loaded_state(design, unloaded, cases[0], engine=engine), checks
     except SimulationFailure:
-        if first.critical * (1 + 1e-9) >= 1.0:
+        if first.borne:
             raise
         return None, checks

@@ -245,9 +245,8 @@ def _acting(loaded: dict, units: Units | None) -> str:
     force = ", ".join(f"{component:.4g}" for component in loaded["total_force"])
     text = f"({force}) {unit_of('force', units)} in all, held at "
     text += counted(len(loaded["supports"]), "joint")
-    sizes = [math.dist((0, 0, 0), row) for row in loaded["reactions"] if None not in row]
-    if sizes:
-        text += f", reactions up to {with_unit(max(sizes), 'force', units, 4)}"
+    if loaded["largest_reaction"] is not None:
+        text += f", reactions up to {with_unit(loaded['largest_reaction'], 'force', units, 4)}"
     return text
 
 

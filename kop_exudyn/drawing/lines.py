@@ -17,7 +17,7 @@ def draw_lines(
     """Lines through points (n, 2) each, in data coordinates, width in points; the axes' limits
     stay as they are.
 
-    In files of vectors they take a tenth of the time and of the room of as many single ones.
+    In files of vectors they take less than half of the time and of the room of single ones.
 
     options : as of a PathPatch; by default as single lines are drawn
     """

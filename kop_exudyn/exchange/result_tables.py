@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -122,13 +122,7 @@ def _loads(result: KitResult) -> Iterator[dict[str, Any]]:
                 "load_case": case,
                 **{k: v for k, v in check.items() if k not in _BY_SUPPORT},
                 **dict(zip(("force_x", "force_y", "force_z"), total)),
-                "largest_reaction": _largest_force(check.get("reactions")),
             }
-
-
-def _largest_force(reactions: Sequence[Sequence[float | None]] | None) -> float | None:
-    known = [row for row in reactions or () if None not in row]
-    return float(np.linalg.norm(np.array(known, float), axis=1).max()) if known else None
 
 
 def _elements(result: KitResult) -> Iterator[dict[str, Any]]:

@@ -15,7 +15,7 @@ from .cutsheets import Sheet
 from .options import tenths
 from .paper import Book, Page, fitting_scale
 from .shapes import CUT, ENGRAVE, NOTES, Hole, Polyline, Shape, Template, Text
-from .stock import StockPlan
+from .stock import Bar, StockPlan
 from .templates import plate_template, strip_template
 
 _COLOURS = {CUT: INK, ENGRAVE: QUIET, NOTES: FAINT}
@@ -145,7 +145,10 @@ def stock_pages(book: Book, blanks: Blanks, plan: StockPlan | None) -> None:
     page, y = None, 0.0
     for alike in _runs([(bar.length, bar.pieces) for bar in plan.bars]):
         bar = plan.bars[alike[0]]
-        if page is None or y - 17.0 < page.low[1]:
+        pieces = _laid_out(bar, scale, blanks.options.kerf)
+        below = [(left + step / 2, under) for left, step, _, under in pieces if under]
+        rows = _rows(below, room[0])
+        if page is None or y - 11.0 - _ROW * rows < page.low[1]:
             page = book.page(f"Bars to saw, {blanks.board.section} mm", scale)
             noted = page.note(
                 f"{counted(len(plan.bars), 'bar')}: {_lengths(plan)}; "
@@ -169,24 +172,17 @@ def stock_pages(book: Book, blanks: Blanks, plan: StockPlan | None) -> None:
             ],
             QUIET,
         )
-        short: list[tuple[float, str]] = []  # middles of pieces without room, and what is below
-        for label, length in bar.pieces:
-            step = length / scale
+        for left, step, inside, _ in pieces:
             page.ax.fill(
-                [x, x + step, x + step, x],
+                [x + left, x + left + step, x + left + step, x + left],
                 [y, y, y + 4, y + 4],
                 facecolor="#f1ede4",
                 edgecolor=INK,
                 lw=0.6,
             )
-            text = f"{label}  {tenths(length)}"
-            if text_extent(text, 6.5)[0] > step - 1:
-                named = text_extent(label, 6.5)[0] <= step - 0.5
-                short.append((x + step / 2, tenths(length) if named else text))
-                text = label if named else ""
-            page.text(x + step / 2, y + 1.9, text, 6.5, ha="center", va="center")
-            x += step + blanks.options.kerf / scale
-        below = _below(page, short, y) if short else 0.0
+            page.text(x + left + step / 2, y + 1.9, inside, 6.5, ha="center", va="center")
+        if below:
+            _under(page, [(x + middle, text) for middle, text in below], rows, y)
         page.text(
             page.low[0] + _NUMBERS + 2.0 + bar.length / scale,
             y + 2.0,
@@ -197,20 +193,44 @@ def stock_pages(book: Book, blanks: Blanks, plan: StockPlan | None) -> None:
             va="center",
             color=QUIET,
         )
-        y -= below
+        y -= _ROW * rows
 
 
-def _below(page: Page, texts: Sequence[tuple[float, str]], y: float) -> float:
-    """Texts under a bar's lower edge at y, in as many rows as they need to be near; the room taken,
-    mm.
+def _laid_out(bar: Bar, scale: float, kerf: float) -> list[tuple[float, float, str, str]]:
+    """For each piece of a bar on the page: where it begins and how wide it is, mm from the bar's
+    left end, what is written in it, and what under it as there is no room."""
+    found, left = [], 0.0
+    for label, length in bar.pieces:
+        step = length / scale
+        inside, under = f"{label}  {tenths(length)}", ""
+        if text_extent(inside, 6.5)[0] > step - 1:
+            named = text_extent(label, 6.5)[0] <= step - 0.5
+            inside, under = (label, tenths(length)) if named else ("", inside)
+        found.append((left, step, inside, under))
+        left += step + kerf / scale
+    return found
 
-    texts : the middles of what they are about, mm on the page, from left to right, and they
-    """
-    wide = max(text_extent(text, _SHORT)[0] for _, text in texts) + 1.5
-    low, high = page.low[0] + wide / 2, page.high[0] - wide / 2
-    span = min(texts[-1][0] - texts[0][0] + _ASIDE * wide, high - low)
-    rows = int(np.ceil((len(texts) - 1) * wide / span)) or 1
-    apart = wide / rows
+
+def _room_of(texts: Sequence[tuple[float, str]]) -> float:
+    """What each of them takes in a row, mm."""
+    return max(text_extent(text, _SHORT)[0] for _, text in texts) + 1.5
+
+
+def _rows(texts: Sequence[tuple[float, str]], width: float) -> int:
+    """In how many rows texts stand near to their middles, from left to right; width : of the page's
+    room, mm."""
+    if not texts:
+        return 0
+    wide = _room_of(texts)
+    span = min(texts[-1][0] - texts[0][0] + _ASIDE * wide, width - wide)
+    return int(np.ceil((len(texts) - 1) * wide / span)) or 1
+
+
+def _under(page: Page, texts: Sequence[tuple[float, str]], rows: int, y: float) -> None:
+    """Texts in rows under a bar's lower edge at y, with lines from the middles of what they are
+    about."""
+    wide = _room_of(texts)
+    low, high, apart = page.low[0] + wide / 2, page.high[0] - wide / 2, wide / rows
     places = _spread([middle for middle, _ in texts], apart)
     least = low + apart * np.arange(len(texts))
     places = np.maximum(places - max(places[-1] - high, 0.0), least)
@@ -220,7 +240,6 @@ def _below(page: Page, texts: Sequence[tuple[float, str]], y: float) -> float:
             [[middle, y], [middle, y - 0.6], [place, y - 1.6], [place, under + 1.1]], QUIET, 0.1
         )
         page.text(place, under, text, _SHORT, ha="center", va="center")
-    return _ROW * rows + 0.5
 
 
 def _lengths(plan: StockPlan) -> str:

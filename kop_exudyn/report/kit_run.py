@@ -82,7 +82,7 @@ def optimize_and_report(
     check_request(designs, parts, kit, settings)
     job = described_job(designs, parts, kit, settings)
     if not inputs:
-        job |= {"parameters": {design.name: design_digest(design) for design in designs}}
+        job |= {"content": {design.name: design_digest(design) for design in designs}}
     folder = RunFolder.open(out, Job.of(job, inputs), resume=resume, overwrite=overwrite)
     required = settings.stages.requirements
     verdict = replace(verdict, safety=required.safety)

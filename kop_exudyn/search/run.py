@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, astuple, replace
 from itertools import count
 from time import perf_counter
 from typing import Any
@@ -27,6 +27,7 @@ from ..structures.stacking import (
     stacked_groups,
     stacked_parameters,
 )
+from ..structures.strength import materials_of
 from ..units import Units, common_units, unit_of, unnamed_units
 from ..wording import counted
 from . import demands
@@ -275,12 +276,6 @@ def check_types(designs: Sequence[Design], kit: Kit | Stock | None, settings: Jo
         raise InputError("expected a list of designs, see load_design", field="designs")
     if not len(designs):
         raise InputError("expected one design or more", field="designs")
-    if twice := {a.name for n, a in enumerate(designs) for b in designs[:n] if a.name == b.name}:
-        raise InputError(
-            "two designs have this name, by which results tell them apart",
-            field="designs",
-            value=sorted(twice)[0],
-        )
     if kit is not None and not isinstance(kit, (Kit, Stock)):
         raise InputError("expected a Kit or a Stock, see load_kit", field="kit", value=kit)
     if not isinstance(settings, JobSettings):
@@ -294,11 +289,6 @@ def check_types(designs: Sequence[Design], kit: Kit | Stock | None, settings: Jo
             "expected Weights (Weights.of takes names and numbers)",
             field="settings.weights",
             value=type(settings.weights).__name__,
-        )
-    weights = settings.design_weights
-    if weights is not None and len(weights) != len(designs):
-        raise InputError(
-            f"are {len(weights)}, for {counted(len(designs), 'design')}", field="design_weights"
         )
 
 
@@ -323,9 +313,21 @@ def check_request(
 ) -> None:
     """Raise InputError for what can't be met whatever the simulations say: too many parts or none,
     a kit without a kind that a design is made of, bounds that exclude each other, constraints on
-    other parameters, a cluster that can't be used."""
+    other parameters, designs of one name, weights of other designs, a cluster that can't be
+    used."""
     if (parts is None) == (kit is None):
         raise InputError("give either numbers of parts or a kit", field="parts")
+    if twice := {a.name for n, a in enumerate(designs) for b in designs[:n] if a.name == b.name}:
+        raise InputError(
+            "two designs have this name, by which results tell them apart",
+            field="designs",
+            value=sorted(twice)[0],
+        )
+    weights = settings.design_weights
+    if weights is not None and len(weights) != len(designs):
+        raise InputError(
+            f"are {len(weights)}, for {counted(len(designs), 'design')}", field="design_weights"
+        )
     if settings.scheduler is not None:
         check_cluster(settings.scheduler)
     units = common_units({design.name: design.units for design in designs})
@@ -401,6 +403,8 @@ def design_digest(design: Design) -> str:
             *(scene.initial.positions, scene.initial.rotations, scene.initial.angles),
             [np.nan if role.opening is None else role.opening],
         ]
+    for material in materials_of(design):
+        arrays += [[np.nan if value is None else value for value in astuple(material)]]
     for case in design.load_cases:
         given = (case.gravity, case.line, case.area, case.plan, case.joints, case.forces)
         limits = (case.factor, case.deflection.absolute, case.deflection.span_over)

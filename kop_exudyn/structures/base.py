@@ -38,6 +38,7 @@ _WORKSPACES = "_workspaces"  # of the solver, by thread
 
 
 # An engine's way from a start to an equilibrium, with the parameters of `equilibrium.newton.solve`.
+_NO_FILE = "design"  # what errors begin with where the content is of no file
 Solve = Callable[..., "Equilibrium"]
 
 
@@ -335,7 +336,7 @@ def class_names() -> list[str]:
     return CLASSES.names()
 
 
-def design_from_dict(data: Mapping[str, Any], source: str = "design") -> Design:
+def design_from_dict(data: Mapping[str, Any], source: str = _NO_FILE) -> Design:
     """Make the design that a design file's content describes.
 
     data : the content, as the class's schema describes it
@@ -360,7 +361,7 @@ def design_from_dict(data: Mapping[str, Any], source: str = "design") -> Design:
     design = reader(near, source)
     if middle.any():
         design.middle = middle
-    design.source = None if source is None else str(source)
+    design.source = None if source == _NO_FILE else str(source)
     if "units" in data:
         design.units = units_from_dict(data["units"])
     design.origin = design.middle + np.array(data.get("origin", (0.0, 0.0, 0.0)), float)

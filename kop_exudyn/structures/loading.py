@@ -73,6 +73,7 @@ class LoadedState:
         """As `kop simulate --json` has it: lengths in the design's units, percentages of the
         target's size."""
         d, case = self.deflections, self.case
+        known = np.linalg.norm(self.reactions[~np.isnan(self.reactions).any(axis=1)], axis=1)
         return {
             "gravity": None if case.gravity is None else case.gravity.tolist(),
             "total_force": self.total_force.tolist(),
@@ -80,6 +81,7 @@ class LoadedState:
             "reactions": [
                 [None if np.isnan(v) else v for v in row] for row in self.reactions.tolist()
             ],
+            "largest_reaction": float(known.max()) if len(known) else None,
             "deflection": {
                 "max": float(d.max()),
                 "mean": float(d.mean()),

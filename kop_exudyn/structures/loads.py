@@ -16,7 +16,6 @@ from ..geometry.cells import cells_between, shares_of
 
 FILE_LOADS = "loads"  # name of the case that a file's fields "loads" and "supports" make
 _STRAIGHT = 1e-3  # points within this share of their extent from a line don't hold a structure
-_LIMITS = {"absolute", "span_over"}
 _SPREAD = ("gravity", "line", "area", "plan")  # loads of three numbers, or None
 
 
@@ -130,13 +129,14 @@ class LoadCase:
         self._check_shapes()
         check_positive("loads.factor", self.factor)
         if not isinstance(self.deflection, DeflectionLimit):
-            if not isinstance(self.deflection, Mapping) or set(self.deflection) - _LIMITS:
+            try:
+                object.__setattr__(self, "deflection", DeflectionLimit(**self.deflection))
+            except TypeError:
                 raise InputError(
                     "expected a DeflectionLimit, or absolute and span_over",
                     field="loads.deflection",
                     value=self.deflection,
-                )
-            object.__setattr__(self, "deflection", DeflectionLimit(**self.deflection))
+                ) from None
 
     def _check_shapes(self) -> None:
         for name in _SPREAD:

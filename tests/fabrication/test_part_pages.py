@@ -89,6 +89,17 @@ def test_lengths_of_pieces_without_room_stand_below(parts, number):
     assert all(left - 1 <= box.x0 and box.x1 <= right + 1 for box in boxes)
 
 
+def test_what_is_under_a_bar_stays_on_its_page(parts):
+    blanks, book = Blanks(parts, "m"), Book("a4", "kit")
+    pieces = tuple((f"L{k}", 5.0 + 0.1 * k) for k in range(60))
+    bars = tuple(Bar(2400.0 - k, pieces, 0.0) for k in range(30))
+    stock_pages(book, blanks, StockPlan(bars, 4800.0))
+    assert len(book.pages) > 1
+    for page in book.pages:
+        for text in page.ax.texts:
+            assert page.low[1] - 1e-6 <= text.get_position()[1] <= page.high[1] + 1e-6
+
+
 def test_what_is_rounded_to_nothing_has_no_sign():
     assert [_cell("x_mm", x) for x in (-0.04, 0.0, -0.06)] == ["0.0", "0.0", "-0.1"]
 

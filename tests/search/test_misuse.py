@@ -129,13 +129,14 @@ def test_terms_that_can_not_be_registered(monkeypatch):
     assert base.register_term(mine) is mine  # as a notebook's cell that runs again
 
 
-def test_a_run_is_not_resumed_with_another_design(designs, tmp_path):
+@pytest.mark.parametrize("changed", ["young", "elastic_limit"])
+def test_a_run_is_not_resumed_with_another_design(designs, tmp_path, changed):
     """Of other material, with the same parameters."""
     settings = {"parts": PARTS, "out": tmp_path / "out", "settings": SETTINGS}
     kop.optimize_and_report(designs[:1], **settings)
     data = _content(designs[0])
-    data["material"] = data["material"] | {"young": 3 * data["material"]["young"]}
-    with pytest.raises(kop.InputError):
+    data["material"] = data["material"] | {changed: 3 * data["material"][changed]}
+    with pytest.raises(kop.InputError, match="content.small sinh was"):
         kop.optimize_and_report([design_from_dict(data)], **settings, resume=True)
 
 

@@ -439,3 +439,6 @@ def test_rods_that_sag_between_joints(repository):
         told[pieces] = result.loaded.deflections.max(), any("sag" in w for w in result.warnings)
     assert told[2][1] and not told[16][1]
     assert 0.88 * told[16][0] < told[2][0] < 0.95 * told[16][0]
+    shell = load_design(repository / "models" / "small" / "01_sinh.json")
+    held = LoadCase(line=[0, 0, -1.0], supports=list(range(len(shell.joints))))
+    assert any("sag" in warning for warning in simulate(shell, held, warn=False).warnings)
