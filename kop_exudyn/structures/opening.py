@@ -27,6 +27,7 @@ from ..scene.state import State
 SAME_STATE = 1e-3  # of the bounding box: states whose joints are this close are one
 _FLAT = 1e-4  # of the bounding box: mean heights of joints that are none
 _MOST_ITERATIONS = 80  # of a correction; what takes longer isn't near the predicted state
+_OTHER_SIDE = 0.5  # of the distance from a shape, that from its mirror image: a state is this one
 _PARTS = (1, 2, 4)  # of the way between two stations that one is led to the other in
 
 
@@ -45,6 +46,17 @@ class Station:
     scene: str
     opening: float | None = None
     lifted: Start | None = None
+
+    def side(self, system: System) -> np.ndarray | None:
+        """(n_free,) where a saddle is left to: towards the shape to lift to, whose mirror image is
+        as good an equilibrium. A net may bend in another way first, and turn into that shape at a
+        bifurcation on the way."""
+        if self.lifted is None:
+            return None
+        heights = np.zeros(system.scene.n_dofs)
+        z = self.lifted.state.positions[:, 2]
+        heights[: 6 * len(z)].reshape(-1, 6)[:, 2] = z - z.mean()
+        return heights[system.sparsity.free]
 
 
 @dataclass(frozen=True)
@@ -93,9 +105,14 @@ class Way:
                 steps = [0.5 * (opening + station.opening), station.opening]
             passed: list[Equilibrium] = []
             try:
+                options = NewtonOptions(side=station.side(system))
                 for to in steps:
-                    passed += _stepped(system, q, before, opening, to, solve)
+                    passed += _stepped(system, q, before, opening, to, solve, options)
                     before, opening = passed[-1], to
+                other = self._righted(system, q, station, passed[-1], solve)
+                if other is not None:
+                    passed.append(other)
+                    before = other
             except SimulationFailure as failure:
                 raise failure.within(station.name) from None
             found.append(passed[-1].after(*passed[:-1]))
@@ -150,12 +167,40 @@ class Way:
                 )
                 if number > first and not lifted:
                     before = systems[self.stations[number - 1].scene]
-                    found.append(_led(before, systems[station.scene], q, found[-1], station, parts))
+                    state = _led(before, systems[station.scene], q, found[-1], station, parts)
                 else:
-                    found.append(_near(systems[station.scene], q, near, station))
+                    state = _near(systems[station.scene], q, near, station)
+                other = self._righted(systems[station.scene], q, station, state, solve)
+                found.append(state if other is None else other)
             except SimulationFailure as failure:
                 raise failure.within(station.name) from None
         return found
+
+    def _righted(
+        self,
+        system: System,
+        q: np.ndarray,
+        station: Station,
+        found: Equilibrium,
+        solve: Callable[..., Equilibrium],
+    ) -> Equilibrium | None:
+        """The state on the side of the shape to lift to, where a station's state has come out as
+        that shape's mirror image and there is one; else None.
+
+        A net may bend in another way first, and turn into one of the two where that one ends: which
+        of them, the builder's hands decide.
+        """
+        if station.lifted is None or not self._mirrored(station.lifted.state, found.state):
+            return None
+        options = NewtonOptions(side=station.side(system))
+        other = solve(system, q, station.lifted, station.opening, options)
+        return None if self._mirrored(station.lifted.state, other.state) else other
+
+    def _mirrored(self, wanted: State, found: State) -> bool:
+        """Whether the joints lie clearly nearer to a shape's mirror image than to the shape."""
+        x, y = (state.positions[self.joints] for state in (found, wanted))
+        own, other = (_apart(x, y * (1.0, 1.0, side)).max() for side in (1.0, -1.0))
+        return bool(other < _OTHER_SIDE * own and own > SAME_STATE * self.size)
 
     @property
     def _first(self) -> int:
@@ -179,9 +224,14 @@ class Way:
         """The largest distance of a joint in two states at their best placement, as a share of
         the size."""
         x, y = (e.state.positions[self.joints] for e in (a, b))
-        x, y = x - x.mean(axis=0), y - y.mean(axis=0)
-        turn, _ = Rotation.align_vectors(y, x)
-        return float(np.linalg.norm(turn.apply(x) - y, axis=1).max()) / self.size
+        return float(_apart(x, y).max()) / self.size
+
+
+def _apart(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """(n,) distances of points (n, 3) from others, at the best placement."""
+    x, y = x - x.mean(axis=0), y - y.mean(axis=0)
+    turn, _ = Rotation.align_vectors(y, x)
+    return np.linalg.norm(turn.apply(x) - y, axis=1)
 
 
 def _stepped(
@@ -191,16 +241,17 @@ def _stepped(
     opening: float | None,
     to: float | None,
     solve: Callable[..., Equilibrium],
+    options: NewtonOptions,
 ) -> list[Equilibrium]:
     """The states between a start of some opening and the one at another, that one included: none
     between them unless a saddle was left."""
     if opening is None or to is None:
-        return [solve(system, q, before, to)]
+        return [solve(system, q, before, to, options)]
     for parts in _PARTS:
         found: list[Equilibrium] = []
         for k in range(1, parts + 1):
             at = to if k == parts else opening + (to - opening) * k / parts
-            found.append(solve(system, q, found[-1] if found else before, at))
+            found.append(solve(system, q, found[-1] if found else before, at, options))
             if found[-1].escapes and parts < _PARTS[-1]:
                 break
         else:
@@ -210,9 +261,10 @@ def _stepped(
 
 def _near(system: System, q: np.ndarray, near: Equilibrium, station: Station) -> Equilibrium:
     """A station's state: from its lifted shape, or predicted from one at other parameters."""
+    side, opening = station.side(system), station.opening
     if station.lifted is not None:
-        return solve(system, q, station.lifted, station.opening)
-    options, opening = NewtonOptions(max_iterations=_MOST_ITERATIONS), station.opening
+        return solve(system, q, station.lifted, opening, NewtonOptions(side=side))
+    options = NewtonOptions(max_iterations=_MOST_ITERATIONS, side=side)
     start = Sensitivities(system, near).predict(q - near.q)
     try:
         return solve(system, q, start, opening, options)
@@ -229,7 +281,7 @@ def _led(
     parts: int,
 ) -> Equilibrium:
     """The state that one leads to at the next station, in equal parts of the way."""
-    options = NewtonOptions(max_iterations=_MOST_ITERATIONS)
+    options = NewtonOptions(max_iterations=_MOST_ITERATIONS, side=station.side(system))
     if here.opening is None or station.opening is None or before is not system:
         return solve(system, q, here, station.opening, options)
     step, state = (station.opening - here.opening) / parts, here

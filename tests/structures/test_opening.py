@@ -46,8 +46,8 @@ def test_steps_that_leave_a_saddle_are_taken_in_parts(shell, states):
     longest, taken = 0.06, []
 
     def jumpy(always):
-        def solving(system, q, before, to):
-            found = solve(system, q, before, to)
+        def solving(system, q, before, to, options):
+            found = solve(system, q, before, to, options)
             step = to - getattr(before, "opening", to)
             taken.append(step)
             return replace(found, escapes=1) if always or abs(step) > longest else found
@@ -85,9 +85,9 @@ def test_it_is_lifted_until_it_stays_up(shell, states):
     stations[flat] = replace(stations[flat], lifted=stations[first].lifted)  # falls back
     asked = []
 
-    def counting(system, q, before, to):
+    def counting(system, q, before, to, options):
         asked.append(before)
-        return solve(system, q, before, to)
+        return solve(system, q, before, to, options)
 
     q = shell.parameters
     rest = solve(shell.systems["rest"], q, None, shell.roles[1].opening)

@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from ...checks import check_choice
 from ...equilibrium.equilibria import Equilibrium, Start
 from ...equilibrium.newton import solve as fast
 from ...equilibrium.system import System
@@ -46,7 +47,7 @@ from ..base import (
 )
 from ..deviation import OFF_TARGET
 from ..fitting import TargetFitting
-from ..mesh_target import check_target_size, load_target_mesh, target_on_mesh
+from ..mesh_target import check_target_size, load_target_mesh, target_doubts, target_on_mesh
 from ..numbering import rescaled_values
 from ..opening import Station, Way
 from .opening import check_hinges, check_opening, open_up
@@ -119,6 +120,7 @@ class CShell(Design):
         )
 
     def scene(self, role: str) -> Scene:
+        check_choice("role", role, tuple(self._scenes))
         return self._scenes[role]
 
     @cached_property
@@ -151,7 +153,7 @@ class CShell(Design):
         path = open_up(system, self.flat_angle, self.opening, self.side, engine)
         try:
             for equilibrium in path:
-                check_hinges(self.network, equilibrium.state)
+                check_hinges(self.network, equilibrium.state, self.middle)
         except SimulationFailure as failure:
             raise failure.within("smooth design") from None
         return path
@@ -165,7 +167,7 @@ class CShell(Design):
         smooth design's leads to.
         """
         solve, path = (fast, self.smooth_path) if solve is None else (solve, [])
-        given, q = q is not None, self.parameters if q is None else q
+        given, q = q is not None, self.checked(q)
         try:
             start = Start(self.scene("rest").initial)
             rest = solve(self.systems["rest"], q, start, self._rest_opening)
@@ -181,7 +183,7 @@ class CShell(Design):
 
     def check_state(self, role: str, state: State) -> None:
         """See `check_hinges`."""
-        check_hinges(self.network, state)
+        check_hinges(self.network, state, self.middle)
 
     def _opened(self, q: np.ndarray, rest: Equilibrium, solve: Solve) -> Equilibrium:
         opened = self.way.opened(self.systems, q, self.assembled(q, {"rest": rest}), solve)
@@ -244,6 +246,14 @@ class CShell(Design):
         return {**data, "straightened": self.layout.numbering.split(q)}
 
     @property
+    def doubts(self) -> list[str]:
+        """That the target mesh looks as if it were in another unit, or elsewhere."""
+        if self.target_mesh is None:
+            return []
+        flat = self.network.joints
+        return target_doubts(self.target_mesh, np.column_stack([flat, np.zeros(len(flat))]))
+
+    @property
     def cautions(self) -> list[str]:
         """That a mesh suits the shape better which the design has when it rises to the other side:
         without weight, a plane net's two shapes are mirror images of each other."""
@@ -281,7 +291,9 @@ class CShell(Design):
     def _smooth_at(self, share: float) -> Equilibrium:
         """The smooth design's state nearest to being opened by a share, or by more."""
         path = self.smooth_path
-        return path[min(len(path) - 1, int(np.ceil(share * (len(path) - 1) - 1e-9)))]
+        wanted = (share - 1e-9) * abs(self.opening)
+        opened = (e for e in path if abs((e.opening or 0.0) - self.flat_angle) >= wanted)
+        return next(opened, path[-1])
 
     @cached_property
     def target(self) -> Target:

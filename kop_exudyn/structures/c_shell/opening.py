@@ -5,22 +5,24 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...arrays import Vector
 from ...equilibrium.equilibria import Equilibrium
 from ...equilibrium.newton import NewtonOptions
 from ...equilibrium.newton import solve as fast
 from ...equilibrium.system import System
-from ...errors import InputError, SimulationFailure
+from ...errors import InputError, SimulationFailure, shown_place
 from ...geometry.network import CurveNetwork
 from ...scene.state import State
 from ..base import Solve
 from .own_axes import own_axes
 
+_ON_EACH_OTHER = 1e-6  # rad: laths whose mean angle is smaller
 _OPENING_STEP = 0.1  # rad of mean joint angle a step
 
 
 def check_opening(flat: float, opening: float) -> None:
     """Raise InputError for an opening at whose end, or before, laths would pass through others."""
-    if not 0.0 < flat + opening < np.pi:
+    if not _ON_EACH_OTHER < flat + opening < np.pi - _ON_EACH_OTHER:
         low, high = (float(np.degrees(x)) for x in (-flat, np.pi - flat))
         raise InputError(
             f"takes the mean angle between the curves from {np.degrees(flat):.4g}° "
@@ -32,12 +34,14 @@ def check_opening(flat: float, opening: float) -> None:
         )
 
 
-def check_hinges(network: CurveNetwork, state: State) -> None:
+def check_hinges(network: CurveNetwork, state: State, middle: Vector) -> None:
     """Raise SimulationFailure, naming the joint, for a state in which curves that open have passed
     through each other, or others have turned by half a turn.
 
     Only the mean of the angles is prescribed; a net whose laths brace each other meets it by
     spinning the hinge that resists least.
+
+    middle (3,) : where the network's coordinates begin in those of its file
     """
     angles = state.angles[: network.n_joints]
     turns = angles - network.opening_angles
@@ -46,12 +50,12 @@ def check_hinges(network: CurveNetwork, state: State) -> None:
     worst = int(np.argmax(beyond))
     if beyond[worst] < 0:
         return
-    x = network.joints[worst]
+    x = network.joints[worst] + middle[:2]
     first, second = (
         network.strands[k].curve.field.removesuffix(".points") for k in network.pairs[worst]
     )
     raise SimulationFailure(
-        f"the hinge of {first} and {second} at ({x[0]:.6g}, {x[1]:.6g}) turns by "
+        f"the hinge of {first} and {second} at {shown_place(x, network.size)} turns by "
         f"{np.degrees(turns[worst]):.4g} degrees, which takes the two through each other: this net "
         "does not open by turning its two families, or is opened too far"
     )
@@ -64,6 +68,11 @@ def open_up(
     the plane.
 
     flat : the mean angle of the flat network, the scene's initial state; solve : an engine's
+
+    Returns the states of growing angles, the flat one first. Just beyond the bifurcation, rings and
+    other nets of many folds may move without resistance from one way off the plane to another: a
+    step at which no state is found is taken together with the next. Raises SimulationFailure where
+    none is found at the end.
     """
     scene = system.scene
     steps = max(1, int(np.ceil(abs(opening) / _OPENING_STEP - 1e-9)))
@@ -76,6 +85,8 @@ def open_up(
         try:
             path.append(solve(system, np.empty(0), path[-1], angle, options))
         except SimulationFailure as failure:
+            if step < steps:
+                continue
             raise failure.within(f"smooth design, mean opening angle {angle:.3f} rad") from None
     return path
 
