@@ -121,7 +121,8 @@ def _content(args: argparse.Namespace) -> dict[str, Any]:
     if foreign is None or foreign.rewrite is None:
         edges = "; of a mesh or graph, --edges reads the edges as laths"
         raise InputError(
-            f"isn't a {' or a '.join(format_names())}, nor has curves; of a surface, give --patch"
+            f"isn't a {' or a '.join(format_names())}, nor has curves (lists of points stand "
+            "outermost, objects of COMPAS anywhere); of a surface, give --patch"
             f"{edges if holds_edges(data) else ''}",
             source=args.file,
         )

@@ -10,18 +10,18 @@ import numpy as np
 
 from ..wording import counted
 from .drawing import DrawnCurve, Finding
-from .outlines import place_of
+from .outlines import Places
 
 _SHARP = np.radians(60)  # a hexagon's turn; more is no smooth curve's
 _ROUNDED = 0.1  # of a straight piece: how far a smooth curve may leave it; an octagon's does so
 
 
 def split_at_corners(
-    curves: Sequence[DrawnCurve], flat: Sequence[np.ndarray]
+    curves: Sequence[DrawnCurve], flat: Sequence[np.ndarray], say: Places
 ) -> tuple[list[DrawnCurve], list[np.ndarray], list[Finding]]:
     """The curves in pieces without sharp corners, their points in plan, and what was split.
 
-    flat : points (n, 2) of each in plan
+    flat : points (n, 2) of each in plan; say : of points of the curves
     """
     kept, plan, places, label = [], [], [], ""
     for curve, points in zip(curves, flat):
@@ -37,7 +37,7 @@ def split_at_corners(
         for start, end in zip(bounds[:-1], bounds[1:]):
             picked = np.arange(start, end + 1) % n
             piece = curve.points[picked]
-            name = f"{curve.label.split(' from ')[0]} from {place_of(piece[0])}"
+            name = f"{curve.label.split(' from ')[0]} from {say(piece[0])}"
             kept.append(replace(curve, points=piece, closed=False, label=name))
             plan.append(points[picked])
     if not places:

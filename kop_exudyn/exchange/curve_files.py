@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..files.files import read_bytes
+from ..files.files import as_path, read_bytes
 from ..geometry.nurbs import spline_points
 from ..geometry.obj_files import ObjContent, first_words, parse_obj
 from ..units import LENGTHS
@@ -55,7 +55,7 @@ def read_drawing(path: str | Path, layers: Sequence[str] = ()) -> Drawing:
 
     Raises InputError when the file can't be read, is too large, or has no curves.
     """
-    path = Path(path)
+    path = as_path(path)
     suffix = path.suffix.lower()
     if suffix not in CURVE_READERS:
         raise InputError(f"is no file of curves (known: {', '.join(CURVE_READERS)})", source=path)

@@ -24,7 +24,7 @@ from .curve_files import read_drawing
 from .drawing import Drawing, DrawnCurve, Finding, size_of
 from .frames import Frame, frame_of
 from .joins import join_ends
-from .outlines import place_of
+from .outlines import Places
 from .overlaps import without_overlaps
 from .parts import advice, largest_part
 from .strips import axes_of_strips, sides_of_laths
@@ -129,6 +129,7 @@ class DrawnNetwork:
                 free_ends=self.options.free_ends,
                 acute=True,
                 ends_kept_by=self.options.ends_kept_by,
+                tolerance=self.options.tolerance * self.options.scale * size_of(self.curves),
             )
         except InputError as error:
             named = self.named(error)
@@ -139,7 +140,7 @@ class DrawnNetwork:
             return InputError(message, field=named.field, value=named.value)
 
     def named(self, error: InputError) -> InputError:
-        """An error about a design with the curves named as in the drawing."""
+        """An error about a design with curves and places named as in the drawing."""
 
         def label(found: re.Match) -> str:
             number = int(found[1])
@@ -149,9 +150,21 @@ class DrawnNetwork:
             return re.sub(r"(?:network\.)?curves\[(\d+)\](?:\.points)?", label, text)
 
         field = None if error.field is None else renamed(error.field)
+        located = error.moved(self.place)
         return InputError(
-            renamed(error.message), source=error.source, field=field, value=error.value
+            renamed(located.message), source=error.source, field=field, value=error.value
         )
+
+    def place(self, point: Sequence[float]) -> str:
+        """A point (2,) of the network, or (3,) of the curves, as the drawing has it, in words."""
+        if len(point) == 2:
+            drawn = self.frame(np.concatenate([curve.points for curve in self.curves]))
+            plan = np.array(point) / self.options.scale
+            nearest = int(np.hypot(*(drawn[:, :2] - plan).T).argmin())
+            spot = self.frame.back(np.append(plan, drawn[nearest, 2]))
+        else:
+            spot = np.array(point, float)
+        return Places(size_of(self.curves), self.origin)(spot)
 
     @property
     def _across(self) -> int:
@@ -208,6 +221,7 @@ def drawn_network(
     points = np.concatenate([curve.points for curve in drawing.curves])
     middle_of(points, "curves")  # refuses what lies too far away to be told apart
     origin = far_origin(points) if standard else np.zeros(3)
+    say = Places(size, origin)
     near = [replace(curve, points=curve.points - origin) for curve in drawing.curves]
     curves, done = cleaned(near, tolerance)
     if 2 * len(curves) < len(near):
@@ -225,7 +239,7 @@ def drawn_network(
     if frame.flat and not frame.standard:
         where = f"turned by {np.degrees(frame.tilt):.3g}° against the xy plane"
         findings.append(Finding("cleaned", f"the drawing's plane, {where}, is laid flat"))
-    curves, overlaps = without_overlaps(curves, tolerance)
+    curves, overlaps = without_overlaps(curves, frame, tolerance, say)
     flat = [frame(curve.points)[:, :2] for curve in curves]
     refuse_upright(curves, flat, tolerance)
     strips: list[Finding] = []
@@ -238,14 +252,14 @@ def drawn_network(
         done += others
     parts = advice(curves, flat, tolerance)
     if options.kind == "spline":
-        curves, flat, split = split_at_corners(curves, flat)
+        curves, flat, split = split_at_corners(curves, flat, say)
         done += split
     done += sides_of_laths(curves, flat, tolerance)
     joined = join_ends(
         curves, crossing_pieces(curves, flat, tolerance, size), tolerance, options.join
     )
-    curves, ends = _ends_on_curves(joined.curves, frame, options, tolerance)
-    findings += [*done, *_about_joins(joined), *ends]
+    curves, ends = _ends_on_curves(joined.curves, frame, options, tolerance, say)
+    findings += [*done, *_about_joins(joined, say), *ends]
     if options.kind == "spline":
         findings += rounded_corners(curves)
     entries = [_entry(curve, frame, options, size) for curve in curves]
@@ -268,7 +282,7 @@ def _entry(curve: DrawnCurve, frame: Frame, options: ReadingOptions, size: float
     return {"type": kind, "points": points} | ({"closed": True} if curve.closed else {})
 
 
-def _about_joins(joined: Any) -> list[Finding]:
+def _about_joins(joined: Any, say: Places) -> list[Finding]:
     """What was joined and what was hinged, in words."""
     found = []
     if len(joined.seams):
@@ -289,7 +303,7 @@ def _about_joins(joined: Any) -> list[Finding]:
         text = (
             "more than four ends of curves meet at "
             f"{counted(len(joined.crowded), 'place')}, such as "
-            f"{place_of(joined.crowded[0])}: a joint holds two laths, of which at most four ends "
+            f"{say(joined.crowded[0])}: a joint holds two laths, of which at most four ends "
             "meet"
         )
         found.append(Finding("suspicious", text, joined.crowded, _CROWDED))
@@ -303,7 +317,11 @@ def _about_joins(joined: Any) -> list[Finding]:
 
 
 def _ends_on_curves(
-    curves: list[DrawnCurve], frame: Frame, options: ReadingOptions, tolerance: float
+    curves: list[DrawnCurve],
+    frame: Frame,
+    options: ReadingOptions,
+    tolerance: float,
+    say: Places,
 ) -> tuple[list[DrawnCurve], list[Finding]]:
     """Ends within the tolerance of another curve brought onto it; and what looks like a miss."""
     plain = replace(options, scale=1.0)
@@ -335,11 +353,11 @@ def _ends_on_curves(
             f"{counted(len(moved), 'end')} brought onto the curves beside, by {largest:.3g} at most"
         )
         found.append(Finding("cleaned", text, np.array(moved)))
-    found += _missed(curves, [c for c in near if (c.curve, c.end) not in reached])
+    found += _missed(curves, [c for c in near if (c.curve, c.end) not in reached], say)
     return [replace(curve, points=x) for curve, x in zip(curves, points)], found
 
 
-def _missed(curves: Sequence[DrawnCurve], near: Sequence[EndContact]) -> list[Finding]:
+def _missed(curves: Sequence[DrawnCurve], near: Sequence[EndContact], say: Places) -> list[Finding]:
     """Ends that stop a little short of another curve; where both curves end there, this is told of
     the one that is nearer."""
     told: list[EndContact] = []
@@ -353,11 +371,11 @@ def _missed(curves: Sequence[DrawnCurve], near: Sequence[EndContact]) -> list[Fi
     found = []
     for contact in told:
         labels = (curves[contact.curve].label, curves[contact.other].label)
-        text = (
-            f"{labels[0]} ends {-contact.beyond:.3g} short of {labels[1]}: a joint may be meant "
-            "(--tolerance)"
-        )
         place = curves[contact.curve].points[contact.end][None]
+        text = (
+            f"{labels[0]} ends {-contact.beyond:.3g} short of {labels[1]} at {say(place[0])}: a "
+            "joint may be meant (--tolerance)"
+        )
         found.append(Finding("suspicious", text, place, _SHORT, labels))
     return found
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..errors import InputError
-from .outlines import Outline, place_of
+from ..errors import InputError, shown_place
+from .outlines import Outline
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def shown(outline: Outline, clips: Sequence[Clip], label: str) -> bool:
             raise InputError(
                 f"is cut by the clip (XCLIP) of block {clip.block}, so that a part of it isn't "
                 "seen: explode the block and trim it there, or take the clip off",
-                field=f"{label} from {place_of(outline.corners[0])}",
+                field=f"{label} from {shown_place(outline.corners[0])}",
             )
         if inside == clip.inverted:
             return False

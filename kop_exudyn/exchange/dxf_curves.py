@@ -26,7 +26,7 @@ from .dxf_outlines import outline_of
 from .dxf_repair import with_classes
 from .outlines import flattened
 
-_DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE", "SPLINE", "ARC", "CIRCLE", "ELLIPSE", "MLINE")
+_DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE", "SPLINE", "HELIX", "ARC", "CIRCLE", "ELLIPSE", "MLINE")
 _BINARY = b"AutoCAD Binary DXF"
 _DEEPEST = 20  # blocks within blocks
 _MOST_ENTITIES = 200_000
@@ -231,15 +231,16 @@ def _exploded(
             continue
         count[0] += 1
         _refuse_many(count[0])
-        # entities that only the drawing's program knows have no layer
+        # entities that only the drawing's program knows have neither
         own = entity.dxf.layer if entity.dxf.is_supported("layer") else ""
+        hidden = entity.dxf.is_supported("invisible") and entity.dxf.get("invisible", 0)
         of_outer = outer is not None and (own == "0" or outer.layer.lower() in frozen)
         placed = _Placed(
             entity,
             None if outer is None else outer.matrix,
             outer.layer if outer is not None and of_outer else own,
             f"{entity.dxftype()} {entity.dxf.handle or count[0]}{within}",
-            bool(entity.dxf.get("invisible", 0)) or outer is not None and outer.invisible,
+            bool(hidden) or outer is not None and outer.invisible,
             () if outer is None else outer.clips,
         )
         if entity.dxftype() != "INSERT" or _elsewhere(entity):

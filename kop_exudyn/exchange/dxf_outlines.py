@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..checks import LARGEST
-from ..errors import InputError
+from ..errors import InputError, shown_place
 from ..geometry.nurbs import spline_points
-from .outlines import Outline, place_of
+from .outlines import Outline
 
 _FRAME_VERTEX = 16  # flag of a polyline's vertex: of the polygon that controls a spline
 _FIT_PIECES = 8  # between two fit points
@@ -22,7 +22,7 @@ def outline_of(entity: Any, label: str, matrix: Any = None) -> Outline | None:
     matrix : of ezdxf, the affine map of the block that it is of into the drawing
     """
     try:
-        read = {"SPLINE": _spline, "MLINE": _middle}.get(entity.dxftype(), _path)
+        read = {"SPLINE": _spline, "HELIX": _spline, "MLINE": _middle}.get(entity.dxftype(), _path)
         outline = read(entity, matrix)
     except InputError as error:
         raise InputError(error.message, field=f"{label}{_begin(entity)}") from None
@@ -110,5 +110,5 @@ def _begin(entity: Any) -> str:
     for name in ("start", "insert", "center"):
         place = entity.dxf.get(name) if entity.dxf.is_supported(name) else None
         if place is not None:
-            return f" at {place_of(place)}"
+            return f" at {shown_place(place)}"
     return ""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..analysis.simulation import SimulationResult
-from ..errors import InputError
+from ..checks import check_choice, check_kind, choices
 from ..fabrication.pieces import PartsList, parts_list_of
 from ..files.files import file_stem, make_folder, write_text
 from ..files.tables import write_csv
@@ -61,8 +61,10 @@ def export_desk(
     Raises InputError when a file exists already and `overwrite` is false, or for a stage or format
     that isn't there.
     """
+    check_kind("result", result, KitResult, "see optimize_kit and load_run")
     formats = _checked(formats)
-    outcomes = _known(stage, result.stages, "stage").designs
+    check_choice("stage", stage, result.stages)
+    outcomes = result.stages[stage].designs
     folder, parts = make_folder(folder), parts_list_of(result)
     done = []
     for number, outcome in enumerate(outcomes):
@@ -93,6 +95,7 @@ def export_simulation(
 
     Raises InputError when a file exists already and `overwrite` is false, or for unknown formats.
     """
+    check_kind("result", result, SimulationResult, "see simulate")
     formats, folder = _checked(formats), make_folder(folder)
     states = list(states_of_simulation(result))
     stem = file_stem(result.design.name)
@@ -180,11 +183,4 @@ def _write_tables(
 
 
 def _checked(formats: Iterable[str] | None) -> list[str]:
-    wanted = available_formats() if formats is None else formats
-    return [_known(name, dict(zip(DESK_FORMATS, DESK_FORMATS)), "formats") for name in wanted]
-
-
-def _known(name: str, known: Any, field: str) -> Any:
-    if name not in known:
-        raise InputError(f"unknown (there are {', '.join(known)})", field=field, value=name)
-    return known[name]
+    return choices("formats", available_formats() if formats is None else formats, DESK_FORMATS)

@@ -170,7 +170,7 @@ def _in_plane(drawn: DrawnNetwork, order: _Order) -> Imported:
         frame = replace(frame, origin=frame.origin / ratio)
         goal = mesh_target(relative(target, order.out), frame, ratio * drawn.options.scale)
     data = order.data(drawn, {"target": goal, "free_ends": drawn.options.free_ends})
-    _check(drawn, data, order.out)
+    findings += [Finding("suspicious", text) for text in _check(drawn, data, order.out).doubts]
     return Imported(data, drawn, findings + (_piece_doubts(target) if target is not None else []))
 
 
@@ -241,16 +241,15 @@ def _check(
     data: dict[str, Any],
     out: Path,
     make: Callable[[Mapping[str, Any]], Design] | None = None,
-) -> None:
-    """Raise InputError, in the drawing's words, where no design can be made of the content.
+) -> Design:
+    """The design; raises InputError, in the drawing's words, where none can be made of the content.
 
     make : makes it where the surface's file isn't written yet; None: as any file is read
     """
     try:
         if make is None:
-            design_from_dict(data, str(out))
-        else:
-            make(data)
+            return design_from_dict(data, str(out))
+        return make(data)
     except InputError as error:
         named = drawn.named(error)
         for field in ("surface", "target"):  # files of their own

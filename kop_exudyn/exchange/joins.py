@@ -233,10 +233,10 @@ class _Decision:
     def _hinge(self, a: int, b: int) -> None:
         if self.ends[a][0] == self.ends[b][0]:
             k, end = self.ends[a]
-            x = ", ".join(f"{value:.6g}" for value in self.curves[k].points[end])
             raise InputError(
-                f"its ends meet at a corner at ({x}): no lath is hinged with itself; draw two",
+                "its ends meet at a corner at {place}: no lath is hinged with itself; draw two",
                 field=self.curves[k].label,
+                places=[self.curves[k].points[end]],
             )
         self.families.relate(self.ends[a][0], self.ends[b][0], True)
 

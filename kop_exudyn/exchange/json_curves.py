@@ -29,7 +29,9 @@ def holds_curves(content: bytes) -> bool:
         return False
     try:
         return any(kind in _READERS for kind, _, _ in _objects(_parsed(content), ""))
-    except (InputError, RecursionError):
+    except InputError as error:
+        return error.field is not None  # there are curves, and what isn't one is named when read
+    except RecursionError:
         return False
 
 
@@ -84,8 +86,32 @@ def _objects(data: Any, layer: str, outermost: bool = True) -> Iterator[tuple[st
         if outermost and _is_points(data):
             yield "Polyline", {"points": data}, layer
             return
+        if outermost:
+            _check_siblings(data)
         for item in data:
             yield from _objects(item, layer, outermost)
+
+
+def _check_siblings(items: list[Any]) -> None:
+    """Raise InputError, naming the item, for what is no curve in a list of others that are: it
+    would be missing from the net."""
+    curves = [isinstance(item, list) and _is_points(item) for item in items]
+    if not any(curves):
+        return
+    for k, item in enumerate(items):
+        if curves[k] or isinstance(item, Mapping) and isinstance(item.get("dtype"), str):
+            continue
+        wrong, value = f"[{k}]", item
+        if isinstance(item, list) and len(item) > 1:
+            n = next((n for n, point in enumerate(item) if not _is_points([point] * 2)), None)
+            # each a point for itself: of two and of three numbers
+            wrong, value = (wrong, item) if n is None else (f"{wrong}[{n}]", item[n])
+        raise InputError(
+            "is no curve, as those beside it are: expected two or more points of two, or all of "
+            "three, numbers",
+            field=wrong,
+            value=value,
+        )
 
 
 def _bare(found: Sequence[tuple[str, Any, str]]) -> Iterator[list[list[float]]]:

@@ -19,7 +19,7 @@ from ..geometry.ply_files import parse_ply
 from ..units import LENGTHS
 from .curve_files import MOST_CURVES, SIZE_LIMIT, said_unit
 from .drawing import Drawing, DrawnCurve
-from .outlines import place_of
+from .outlines import Places
 
 EDGE_SUFFIXES = (".obj", ".ply", ".json")
 Edges = tuple[np.ndarray, list[tuple[int, int]]]
@@ -60,10 +60,9 @@ def edges_of(path: Path) -> Drawing:
         raise InputError(
             f"has {len(pairs):,} edges, at most {MOST_CURVES:,} are read as laths", source=path
         )
+    say = Places.of(points)
     curves = [
-        DrawnCurve(
-            points[[a, b]], False, f"edge from {place_of(points[a])} to {place_of(points[b])}"
-        )
+        DrawnCurve(points[[a, b]], False, f"edge from {say(points[a])} to {say(points[b])}")
         for a, b in pairs
     ]
     unit, doubts = said_unit(content) if suffix == ".obj" else (None, [])

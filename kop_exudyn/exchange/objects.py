@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..analysis.simulation import SimulationResult
+from ..checks import check_choice, check_kind
 from ..errors import InputError
 from ..fabrication.pieces import parts_list_of
 from ..search.evaluation import Evaluation
@@ -30,6 +31,7 @@ def to_pandas(result: Result) -> dict[str, Any]:
 
     Raises InputError without pandas.
     """
+    check_kind("result", result, (SimulationResult, KitResult))
     try:
         import pandas
     except ImportError:
@@ -40,7 +42,7 @@ def to_pandas(result: Result) -> dict[str, Any]:
         tables = result_tables(result)
     else:
         rods = [row for state in states_of_simulation(result) for row in rod_rows(state)]
-        places = result.joints + result.design.origin
+        places = result.joints + result.design.file_origin
         joints = [
             {"joint": k, "x": x, "y": y, "z": z, "distance": distance}
             for k, ((x, y, z), distance) in enumerate(zip(places, result.fit.distances), 1)
@@ -78,20 +80,18 @@ def to_compas(
 
 
 def _state(result: Result, name: str | None, design: str | None) -> DesignState:
+    check_kind("result", result, (SimulationResult, KitResult))
     known = {state.name: state for state in _states(result, design)}
     fitted = next(iter(known.values())).design.fitted_role.name
     chosen = fitted if name is None else name
-    if chosen not in known:
-        raise InputError(f"no such state (known: {', '.join(known)})", field="state", value=chosen)
+    check_choice("state", chosen, known)
     return known[chosen]
 
 
 def _states(result: Result, design: str | None) -> Iterator[DesignState]:
     if isinstance(result, SimulationResult):
-        if design not in (None, result.design.name):
-            raise InputError(
-                f"is another design (this one: {result.design.name})", field="design", value=design
-            )
+        own = result.design.name
+        check_choice("design", own if design is None else design, (own,))
         yield from states_of_simulation(result)
         return
     parts = parts_list_of(result)

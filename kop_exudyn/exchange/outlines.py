@@ -3,11 +3,12 @@ curves are to be seen as points."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import shown_place
 from .drawing import SAG, DrawnCurve
 
 
@@ -29,6 +30,7 @@ def flattened(outlines: Sequence[tuple[Outline, str]]) -> Iterator[DrawnCurve]:
     """Points on the outlines, dense enough for the size of all of them."""
     if not outlines:
         return
+    say = Places.of(np.concatenate([outline.corners for outline, _ in outlines]))
     corners = np.concatenate([outline.corners for outline, _ in outlines])
     sag = SAG * float(np.linalg.norm(np.ptp(corners, axis=0)))
     for outline, label in outlines:
@@ -36,9 +38,24 @@ def flattened(outlines: Sequence[tuple[Outline, str]]) -> Iterator[DrawnCurve]:
         closed = outline.closed and len(points) > 3
         kind, _, within = label.partition(" ")
         block = f" {within.partition(' ')[2]}" if " " in within else ""
-        name = f"{kind}{block} from {place_of(points[0])}"
+        name = f"{kind}{block} from {say(points[0])}"
         yield DrawnCurve(points[: len(points) - closed], closed, name, outline.layer)
 
 
-def place_of(point: Iterable[float]) -> str:
-    return f"({', '.join(f'{value:.6g}' for value in point)})"
+@dataclass(frozen=True)
+class Places:
+    """Points as texts, in the drawing's coordinates, with as many digits as tell them apart.
+
+    size : of the drawing; origin (3,) : what has been taken off its coordinates
+    """
+
+    size: float
+    origin: np.ndarray
+
+    @classmethod
+    def of(cls, points: np.ndarray) -> Places:
+        """Of points (n, 3) that are in the drawing's own coordinates."""
+        return cls(float(np.linalg.norm(np.ptp(points, axis=0))), np.zeros(3))
+
+    def __call__(self, point: np.ndarray) -> str:
+        return shown_place(self.origin + point, self.size)

@@ -7,27 +7,43 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
+import shapely.ops
 
 from .corners import cosines_of_turns
 from .drawing import DrawnCurve, Finding
-from .outlines import place_of
+from .frames import Frame
+from .outlines import Places
 
 _GRID = 1e-4  # of the tolerance, that shared stretches are rounded to
+_ALONG = 20.0  # times the tolerance: two curves that are together so far go along each other
+_SAMPLES = 65
 _CORNER = np.cos(np.pi / 4)  # cosine of the turn at a sharp corner
 
 
 def without_overlaps(
-    curves: list[DrawnCurve], tolerance: float
+    curves: list[DrawnCurve], frame: Frame, tolerance: float, say: Places
 ) -> tuple[list[DrawnCurve], list[Finding]]:
-    """Curves in one level plane, such as closed polygons around the cells of a net, in pieces that
-    share no stretch; others are left as they are.
+    """Curves in one plane in pieces that share no stretch; others are left as they are.
 
-    tolerance : a length; shorter common stretches are left
+    Closed polygons around the cells of a net share their sides, laths drawn in pieces overlap at
+    the pieces' ends.
+
+    frame : the plane; tolerance : a length; shorter common stretches are left, curves within it lie
+    on each other; say : of places in the drawing
     """
-    z = np.concatenate([curve.points[:, 2] for curve in curves])
+    z = np.concatenate([frame(curve.points)[:, 2] for curve in curves])
     if np.ptp(z) > tolerance:
         return curves, []
-    lines = np.array([_line(curve) for curve in curves])
+    curves, shared = _shared_once(curves, frame, float(np.median(z)), tolerance, say)
+    curves, trimmed = _trimmed(curves, frame, float(np.median(z)), tolerance)
+    return curves, [*shared, *trimmed]
+
+
+def _shared_once(
+    curves: list[DrawnCurve], frame: Frame, height: float, tolerance: float, say: Places
+) -> tuple[list[DrawnCurve], list[Finding]]:
+    """Stretches that are the same to rounding, each once."""
+    lines = np.array([_line(curve, frame) for curve in curves])
     i, j = shapely.STRtree(lines).query(lines, predicate="intersects")
     i, j = i[i < j], j[i < j]
     # what curves share lies in both their boxes: most neighbours in a net meet in a point
@@ -46,32 +62,93 @@ def without_overlaps(
     first = curves[touched[0]]
     pieces = shapely.get_parts(shapely.unary_union(lines[touched], grid_size=grid))
     merged = [
-        replace(first, points=points, closed=False, label=f"piece from {place_of(points[0])}")
+        replace(first, points=points, closed=False, label=f"piece from {say(points[0])}")
         for piece in pieces
-        for points in _without_corners(_raised(piece, z[0]))
+        for plan in _without_corners(shapely.get_coordinates(piece))
+        for points in [_raised(plan, height, frame)]
     ]
     kept = [curve for k, curve in enumerate(curves) if k not in set(touched)]
     longest = int(np.argmax(shared))
-    text = (
-        f"{len(touched)} curves lie on each other along parts of their way, such as "
-        f"{curves[i[longest]].label} and {curves[j[longest]].label}: each part is read once"
-    )
+    named = (curves[i[longest]].label, curves[j[longest]].label)
     places = np.array([curves[k].points.mean(axis=0) for k in touched])
-    return kept + merged, [Finding("suspicious", text, places)]
+    return kept + merged, [_told(len(touched), named, places)]
 
 
-def _line(curve: DrawnCurve) -> shapely.LineString:
-    points = curve.path
-    return shapely.LineString(points[:, :2])
+def _told(count: int, named: tuple[str, str], places: np.ndarray) -> Finding:
+    text = (
+        f"{count} curves lie on each other along parts of their way, such as {named[0]} and "
+        f"{named[1]}: each part is read once"
+    )
+    return Finding("suspicious", text, places)
 
 
-def _raised(piece: shapely.LineString, z: float) -> np.ndarray:
-    plan = shapely.get_coordinates(piece)
-    return np.column_stack([plan, np.full(len(plan), z)])
+def _trimmed(
+    curves: list[DrawnCurve], frame: Frame, height: float, tolerance: float
+) -> tuple[list[DrawnCurve], list[Finding]]:
+    """Pieces of one line that overlap at their ends, within the tolerance: the one that begins on
+    the other is cut off where that one ends. Curves whose ends touch others and then part from them
+    are left as they are."""
+    lines = np.array([_line(curve, frame) for curve in curves])
+    open_ends = [(k, end) for k, curve in enumerate(curves) if not curve.closed for end in (0, 1)]
+    starts = shapely.get_point(lines[[k for k, _ in open_ends]], [-e for _, e in open_ends])
+    at, near = shapely.STRtree(lines).query(starts, predicate="dwithin", distance=tolerance)
+    changed: dict[int, int] = {}  # curve -> the other that it lay on
+    for n, other in zip(at.tolist(), near.tolist()):
+        k, end = open_ends[n]
+        if other == k or curves[other].closed:
+            continue
+        own = shapely.reverse(lines[k]) if end else lines[k]
+        rest = _beyond(own, lines[other], tolerance)
+        if rest is not None:
+            lines[k] = shapely.reverse(rest) if end else rest
+            changed[k] = other
+    if not changed:
+        return curves, []
+    found = [
+        replace(curve, points=_raised(shapely.get_coordinates(line), height, frame))
+        if k in changed
+        else curve
+        for k, (curve, line) in enumerate(zip(curves, lines))
+    ]
+    first, other = next(iter(changed.items()))
+    named = (curves[first].label, curves[other].label)
+    touched = sorted({*changed, *changed.values()})
+    places = np.array([curves[k].points.mean(axis=0) for k in touched])
+    return found, [_told(len(touched), named, places)]
+
+
+def _beyond(
+    own: shapely.LineString, other: shapely.LineString, tolerance: float
+) -> shapely.LineString | None:
+    """The part of a line past another one that it begins on, away from that one's ends, from where
+    that one ends; None where it doesn't, where the two part before, or nothing is left."""
+    at = other.project(shapely.get_point(own, 0))
+    away = own.interpolate(_ALONG * tolerance)
+    if not tolerance < at < other.length - tolerance or other.distance(away) > tolerance:
+        return None
+    ends = [shapely.get_point(other, n) for n in (0, -1)]
+    stations = [own.project(end) for end in ends if own.distance(end) <= tolerance]
+    stations = [s for s in stations if tolerance < s < own.length - tolerance]
+    if not stations:
+        return None
+    cut = max(stations)
+    common = shapely.ops.substring(own, 0.0, cut)
+    steps = common.interpolate(np.linspace(0.0, common.length, _SAMPLES))
+    if shapely.distance(other, steps).max() > tolerance:
+        return None
+    return shapely.ops.substring(own, cut, own.length)
+
+
+def _line(curve: DrawnCurve, frame: Frame) -> shapely.LineString:
+    return shapely.LineString(frame(curve.path)[:, :2])
+
+
+def _raised(plan: np.ndarray, height: float, frame: Frame) -> np.ndarray:
+    return frame.back(np.column_stack([plan, np.full(len(plan), height)]))
 
 
 def _without_corners(points: np.ndarray) -> Iterator[np.ndarray]:
-    """A polyline (n, 3) in parts that have no sharp corners."""
+    """A polyline (n, 2) in parts that have no sharp corners."""
     sharp = np.flatnonzero(cosines_of_turns(points[:, :2]) < _CORNER) + 1
     for start, end in zip([0, *sharp], [*sharp, len(points) - 1]):
         yield points[start : end + 1]

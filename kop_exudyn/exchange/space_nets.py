@@ -12,7 +12,6 @@ from ..errors import InputError
 from ..geometry.mesh_surface import MeshSurface
 from .drawing import Finding, path_of
 from .drawn_networks import DrawnNetwork
-from .outlines import place_of
 
 _MARGIN = 0.08  # of the plan's size, by which the mesh goes beyond the net
 _MOST_POINTS = 700  # that the surface is put through: one dense system of equations
@@ -72,8 +71,9 @@ def with_heights_checked(drawn: DrawnNetwork) -> DrawnNetwork:
             first, second = (drawn.labels[c] for c in pair)
             raise InputError(
                 f"passes {second} at a distance of {apart[-1]:.3g} where they cross in plan, at "
-                f"{place_of(net.joints[joint])}: laths are hinged where they meet",
+                "{place}: laths are hinged where they meet",
                 field=first,
+                places=[drawn.place(net.joints[joint])],
             )
     largest = max(apart)
     if largest <= _NOTED * net.size:

@@ -11,7 +11,6 @@ import shapely
 from ..errors import InputError
 from ..wording import counted
 from .drawing import DrawnCurve, Finding
-from .outlines import place_of
 from .strips import is_narrow
 
 # A loop around a place where two curves cross is a bolt's if it is nearly centred there, and so
@@ -122,10 +121,10 @@ def refuse_upright(
         if not (steps <= tolerance).any():
             continue
         k = int(steps.argmin())
-        a, b = (place_of(curve.points[n]) for n in (k, k + 1))
         raise InputError(
-            f"is seen as a point between {a} and {b}: nets in space are read as height fields, "
+            "is seen as a point between {place}: nets in space are read as height fields, "
             "along the axis that they lie across most. Turn the drawing, or leave upright pieces "
             "out",
             field=curve.label,
+            places=curve.points[[k, k + 1]],
         )

@@ -192,9 +192,9 @@ def _crossings(
         least = np.degrees(_LEAST_ANGLE)
         angle = f" (at {degrees:.2g}°: joints need {least:.3g}°)" if degrees > _TOLD_ANGLE else ""
         raise InputError(
-            f"touches {other} or runs along it near ({x[0]:.6g}, {x[1]:.6g}) instead of crossing "
-            f"it{angle}",
+            f"touches {other} or runs along it near {{place}} instead of crossing it{angle}",
             field=curves[a[k]].field,
+            places=[x],
         )
     keep = np.flatnonzero(meeting & (gap <= 1e-3 * margin))
     a, b = a[keep], b[keep]
@@ -313,8 +313,9 @@ def _refuse_self_crossing(
         first = i[crossing].min()
         x = start[first]
         raise InputError(
-            f"the curve crosses itself near ({x[0]:.6g}, {x[1]:.6g})",
+            "the curve crosses itself near {place}",
             field=curves[pieces.curve[first]].field,
+            places=[x],
         )
 
 

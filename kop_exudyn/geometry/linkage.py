@@ -18,6 +18,7 @@ from ..wording import counted
 from .network import CurveNetwork
 
 _FREE = 1e-12  # of the largest eigenvalue of the constraints: round-off in the joints' places
+_NAMED = 3  # joints, by their places
 _STILL = 1e-5  # of the largest turn: hinges that don't take part in a motion
 
 
@@ -59,11 +60,15 @@ def refuse_loose_parts(network: CurveNetwork) -> None:
     named = _beside_the_rest(network, moving)
     fields = [network.strands[k].curve.field.removesuffix(".points") for k in named[:4]]
     more = f" and {len(named) - 4} more" if len(named) > 4 else ""
+    joints = network.joints[moving]
+    others = len(joints) - _NAMED
+    beside = f" and {counted(others, 'joint')} more" if others > 0 else ""
     verb = "turns" if len(named) == 1 else "move"
     raise InputError(
-        f"{verb} about {_places(network.joints[moving])} without the rest of the net, at no "
-        "resistance: hold it by a second joint, or leave it out",
+        f"{verb} about {{place}}{beside} without the rest of the net, at no resistance: hold it by "
+        "a second joint, or leave it out",
         field=", ".join(fields) + more,
+        places=joints[:_NAMED],
     )
 
 
@@ -82,8 +87,3 @@ def _smallest_motion(turns: np.ndarray) -> np.ndarray:
     turning = np.abs(shares) > _STILL * np.abs(np.diag(shares)).max()
     counts = np.where(turning.any(axis=0), turning.sum(axis=0), len(turns) + 1)
     return turning[:, int(np.argmin(counts))]
-
-
-def _places(points: np.ndarray) -> str:
-    shown = ", ".join(f"({x:.6g}, {y:.6g})" for x, y in points[:3])
-    return shown + (f" and {counted(len(points) - 3, 'joint')} more" if len(points) > 3 else "")

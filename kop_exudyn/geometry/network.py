@@ -123,6 +123,7 @@ def network(
     *,
     acute: bool = False,
     ends_kept_by: str = "",
+    tolerance: float = 0.0,
 ) -> CurveNetwork:
     """Join curves where they cross.
 
@@ -131,6 +132,7 @@ def network(
     acute : whether the first family is chosen by the shape of the net (see `acute_first`), so that
         the order in which the curves are given tells nothing; otherwise it is that of the first one
     ends_kept_by : what a reader sets so that free ends stay, for errors; "" where nothing does
+    tolerance : a length within which points are the same
 
     Raises InputError, naming the curve, where no structure comes of it: a curve that crosses no
     other, crosses itself, touches or overlaps another, three curves through one point, parts that
@@ -141,7 +143,7 @@ def network(
     points = (
         find_crossings(curves) if isinstance(crossings, str) else given_crossings(curves, crossings)
     )
-    _refuse_triple_points(curves, points, TOLERANCE * size_of(curves))
+    _refuse_triple_points(curves, points, max(tolerance, TOLERANCE * size_of(curves)))
     _refuse_unconnected(curves, points)
     first_family, opens = families(len(curves), points)
     pairs = np.array([c.curves for c in points])
@@ -285,12 +287,11 @@ def _refuse_triple_points(
         *others, last = (
             curves[k].field for k in sorted({*crossings[a].curves, *crossings[b].curves})
         )
-        x = crossings[a].position
         raise InputError(
-            f"passes through one point ({x[0]:.6g}, {x[1]:.6g}) with {', '.join(others)}: a joint "
-            f"holds "
-            "two curves",
+            f"passes through one point {{place}} with {', '.join(others)}: a joint holds two "
+            "curves",
             field=last,
+            places=[crossings[a].position],
         )
 
 

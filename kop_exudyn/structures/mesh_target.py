@@ -15,7 +15,7 @@ from .base import Target
 
 _MAX_ITERATIONS = 200
 _SQUARE = 1e-6
-_SMALLEST = 0.1  # of a design's size: of its target
+_SMALLEST, _LARGEST = 0.1, 20.0  # of a design's size: of its target
 _SETTLED = 1e-6  # of the joints' size, by which an iteration moves them
 
 
@@ -55,6 +55,24 @@ def check_target_size(surface: TriangleSurface, size: float, file: str) -> None:
             field="target.file",
             value=file,
         )
+
+
+def target_doubts(surface: TriangleSurface, joints: np.ndarray) -> list[str]:
+    """What looks as if a target were in another unit, or elsewhere, than the joints (n, 3) that are
+    to be laid onto it, in words."""
+    size, own = size_of_points(joints), size_of_points(surface.vertices)
+    if own > _LARGEST * size:
+        return [
+            f"the target is {own / size:.3g} times as large as the design, of which {size:.3g} is "
+            "the size: is it in the same unit? The field target.scale multiplies its coordinates"
+        ]
+    away = float(np.linalg.norm(surface.closest(joints).points - joints, axis=1).min())
+    if away > size:
+        return [
+            f"the target lies {away:.3g} away, {away / size:.3g} times the design's size: joints "
+            "are drawn to its nearest parts. Move one to the other (the field target.origin)"
+        ]
+    return []
 
 
 def target_on_mesh(surface: TriangleSurface, joints: np.ndarray) -> Target:

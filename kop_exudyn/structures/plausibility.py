@@ -75,7 +75,8 @@ def _meant(value: float, likely: tuple[float, float], unit: str, si: float) -> s
 
 
 def design_doubts(design: Design) -> list[str]:
-    """All of these about a design: its sections beside its rods' pieces, its materials."""
+    """All of these about a design: its sections beside its rods' pieces, its materials, and what
+    its class has doubts about."""
     scene = design.scene(design.fitted_role.name)
     x = scene.node_poses(scene.initial)[0]
     found = []
@@ -90,4 +91,4 @@ def design_doubts(design: Design) -> list[str]:
         # a span is two pieces
         doubt = section_doubt(sides.tolist(), 2 * np.array(lengths), design.units)
         found += [doubt] if doubt else []
-    return found + material_doubts(materials_of(design), design.units)
+    return design.doubts + found + material_doubts(materials_of(design), design.units)
