@@ -6,7 +6,8 @@ letter for what is free: `typing.get_args(Points)` is (numpy.ndarray of float, (
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Sequence
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,10 @@ from numpy.typing import NDArray
 _Floats = NDArray[np.float64]
 _Whole = NDArray[np.int_]
 
+NumbersLike = NDArray[Any] | Sequence[float]
+"""What becomes an array of numbers: lists and tuples as well."""
+RowsLike = NDArray[Any] | Sequence[Sequence[float] | NDArray[Any]]
+"""What becomes an array of rows."""
 Numbers = Annotated[_Floats, ("n",)]
 """One number each."""
 Vector = Annotated[_Floats, (3,)]

@@ -9,6 +9,7 @@ FOLDERS = (
     "arrays",
     "errors",
     "checks",
+    "equality",
     "plugins",
     "provenance",
     "units",

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Indices, Numbers, Points, Stresses, Vector
+from ..checks import check_kind
 from ..equilibrium.model_gradient import ModelGradient, model_gradient
 from ..equilibrium.sensitivities import Sensitivities
 from ..equilibrium.system import System
@@ -50,6 +51,7 @@ class ModelSensitivities:
     """
 
     def __init__(self, result: SimulationResult, loaded: bool = False):
+        check_kind("result", result, SimulationResult, "see simulate")
         self.result, self._design = result, result.design
         self._unloaded = Sensitivities(
             self._design.systems[self._design.fitted_role.name], result.deployed

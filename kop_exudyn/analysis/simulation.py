@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Numbers, Points
+from ..checks import check_kind
 from ..compiled.library import library
 from ..equilibrium.engines import FAST
 from ..equilibrium.engines import engine as solver_of
@@ -47,7 +48,7 @@ class SimulationResult:
         compilation
     equilibria, confirmations : by role; the states are Exudyn's
     fit : of the deployed joints to the target
-    joints : (n, 3) positions
+    joints : (n, 3) positions in the coordinates of the design's own file
     loaded : the deployed state under the loads, where there are any: those of the first load case;
         see `reached`
     checks : whether each of the load cases is carried, with the states under them
@@ -171,7 +172,7 @@ class SimulationResult:
                 if self.checks
                 else {}
             ),
-            "joints": (self.joints + self.design.origin).tolist(),
+            "joints": (self.joints + self.design.file_origin).tolist(),
         }
 
     def _missed_sag(self, loaded: LoadedState) -> float:
@@ -241,9 +242,11 @@ def simulate(
     SimulationFailure
         a state isn't found, is unstable, or isn't confirmed
     InputError
-        an unknown engine, or loads that the design can't have (see `loaded_state`)
+        no design, an unknown engine, or loads that the design can't have (see `loaded_state`)
     """
+    check_kind("design", design, Design, "see load_design")
     loads = design.loads if loads is None else loads
+    check_kind("loads", loads, LoadCase)
     solve = solver_of(engine)
     library()  # compiled now, where it has to be
     begin = perf_counter()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+from ..checks import check_kind, choices
 from ..errors import InputError
 from ..files.files import file_stem, make_folder, write_text
 from ..files.tables import write_csv
@@ -65,7 +66,10 @@ def export_workshop(
     Raises InputError when a file exists already and `overwrite` is false, for what can't be cut
     (see `Blanks.problems`), and for unknown formats or paper.
     """
-    writers = {name: _known(name) for name in formats}
+    check_kind("parts", parts, PartsList, "see parts_list_of")
+    check_kind("options", options, CutOptions)
+    check_kind("tolerances", tolerances, Tolerances)
+    writers = {name: SHEET_FORMATS[name] for name in choices("formats", formats, SHEET_FORMATS)}
     blanks = Blanks(parts, unit, options)
     if not force:
         blanks.check()
@@ -151,11 +155,3 @@ def _write_sheets(
         for number, sheet in enumerate(sheets, 1)
         for suffix, write in writers.items()
     ]
-
-
-def _known(name: str) -> Callable[..., Path]:
-    if name not in SHEET_FORMATS:
-        raise InputError(
-            f"unknown (there are {', '.join(SHEET_FORMATS)})", field="formats", value=name
-        )
-    return SHEET_FORMATS[name]

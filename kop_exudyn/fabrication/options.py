@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..checks import check_not_negative, check_positive
+from ..checks import check_flag, check_not_negative, check_positive, numbers
 from ..errors import InputError
 from ..units import LENGTHS
 
@@ -100,10 +100,28 @@ class CutOptions:
     clearance: float = 0.2
     corners: bool = True
 
+    if TYPE_CHECKING:  # lists are welcome too
+
+        def __init__(
+            self,
+            sheet: Sequence[float] = ...,
+            stock: Sequence[float] = ...,
+            gap: float = 5.0,
+            margin: float = 15.0,
+            kerf: float = 3.0,
+            joint_hole: float = 4.0,
+            bolt_hole: float = 3.0,
+            clearance: float = 0.2,
+            corners: bool = True,
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         for name in ("gap", "margin", "kerf", "joint_hole", "bolt_hole", "clearance"):
             check_not_negative(f"options.{name}", getattr(self, name))
-        if not all(0 < side < np.inf for side in self.sheet):
+        check_flag("options.corners", self.corners)
+        for name in ("sheet", "stock"):
+            object.__setattr__(self, name, numbers(f"options.{name}", getattr(self, name)))
+        if len(self.sheet) != 2 or not all(0 < side < np.inf for side in self.sheet):
             raise InputError(
                 "a sheet has a positive width and height", field="options.sheet", value=self.sheet
             )

@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..checks import check_kind
 from ..errors import InputError
 from ..kit.kinds import PartKind, part_kind
 from ..kit.parts import Assignment, Kit
@@ -177,6 +178,7 @@ def parts_list_of(result: KitResult) -> PartsList:
     The deployed states lie where their joints fit the target best. The input design's states stand
     in where no equilibrium of the assigned design was found.
     """
+    check_kind("result", result, KitResult, "see optimize_kit and load_run")
     found = [
         outcome if isinstance(outcome, Evaluation) else reference
         for outcome, reference in zip(result.stages["assigned"].designs, result.references)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import math
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
@@ -100,8 +101,12 @@ def check_range(data: Any, source: Any = None) -> None:
         elif isinstance(value, (int, float)):
             largest = LARGEST if isinstance(value, float) else LARGEST_WHOLE
             if not -largest <= value <= largest:
+                no_number = isinstance(value, float) and not math.isfinite(value)
                 raise InputError(
-                    "is out of range", source=source, field=dotted(path), value=_shown(value)
+                    "must be finite" if no_number else "is out of range",
+                    source=source,
+                    field=dotted(path),
+                    value=_shown(value),
                 )
             if 0 < abs(value) < SMALLEST and isinstance(path[-1], str):
                 raise InputError(

@@ -29,7 +29,7 @@ def read_bytes(path: str | Path, limit: int = SIZE_LIMIT) -> bytes:
 
     Raises InputError when it can't be read, is damaged, or is larger than `limit` bytes.
     """
-    path = _without_nul(path)
+    path = as_path(path)
     try:
         with open(path, "rb") as file:
             content = file.read(limit + 1)
@@ -55,7 +55,7 @@ def write_bytes(path: str | Path, content: bytes, *, overwrite: bool = False) ->
 
     Raises InputError when the file exists and `overwrite` is false, or when it can't be written.
     """
-    path = _without_nul(path)
+    path = as_path(path)
     check_output_file(path, overwrite=overwrite)
     temporary = None
     try:
@@ -101,7 +101,7 @@ def encoded(text: str, path: str | Path) -> bytes:
 
 def check_output_file(path: str | Path, *, overwrite: bool = False) -> None:
     """Raise InputError unless this file could be written now; its folder must exist."""
-    path = _without_nul(path)
+    path = as_path(path)
     if os.path.isdir(path):
         raise InputError("is a folder, expected a file to write", source=path)
     if os.path.exists(path) and not overwrite:
@@ -126,7 +126,7 @@ def make_folder(path: str | Path) -> Path:
 
     Raises InputError when it can't be made or written to.
     """
-    path = _without_nul(path)
+    path = as_path(path)
     try:
         path.mkdir(parents=True, exist_ok=True)
         # permission bits tell neither of a full nor of a read-only disk
@@ -139,7 +139,10 @@ def make_folder(path: str | Path) -> Path:
     return path
 
 
-def _without_nul(path: str | Path) -> Path:
+def as_path(path: str | Path) -> Path:
+    """The path; raises InputError for what is none, and for a name that no system knows."""
+    if not isinstance(path, (str, os.PathLike)):
+        raise InputError("expected a path", field="path", value=type(path).__name__)
     if "\0" in str(path):
         raise InputError("a name can't contain the character NUL", source=repr(str(path)))
     return Path(path)

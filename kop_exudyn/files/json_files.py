@@ -100,17 +100,19 @@ def to_json(value: Any) -> str:
     return _FLAT_LIST.sub(lambda found: f"[{_LINE_END.sub(' ', found[1])}]", text) + "\n"
 
 
-def plain(value: Any) -> Any:
-    """The same data in JSON's own types: tuples and arrays as lists, numbers that aren't finite as
-    None."""
+def plain(value: Any, *, finite: bool = True) -> Any:
+    """The same data in JSON's own types: tuples and arrays as lists, paths as texts.
+
+    finite : whether numbers that aren't finite become None, or stay
+    """
     if isinstance(value, (np.ndarray, np.generic)):
         value = value.tolist()
     if isinstance(value, float):
-        return value if math.isfinite(value) else None
+        return value if math.isfinite(value) or not finite else None
     if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(key): plain(item, finite=finite) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
+        return [plain(item, finite=finite) for item in value]
     if isinstance(value, Path):
         return value.as_posix()
     return value

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..files.documents import check_envelope, check_range, check_schema, has_schema, is_own
-from ..files.files import reason_of
+from ..files.documents import check_envelope, check_range, is_own
+from ..files.files import as_path, reason_of
 from ..files.json_files import JSON_ENDINGS, json_stem, read_json
 from ..structures.base import Design, design_from_dict, foreign_format
 from ..units import common_units, unnamed_units
@@ -33,17 +33,14 @@ def load_design(path: str | Path) -> Design:
     own = is_own(data)
     if own:
         check_envelope(data, "design", DESIGN_VERSION, source=path)  # or another file of ours
-    check_range(data, source=path)
     # to look for other programs' formats takes all classes' modules, which take long to import
     if not own and (foreign := foreign_format(data)) is not None:
+        check_range(data, source=path)
         try:
             return foreign.read(data, str(path))
         except InputError as error:
             raise error.at(path) from None
     check_envelope(data, "design", DESIGN_VERSION, source=path)
-    check_schema(data, "design", source=path)
-    if has_schema(data["class"]):
-        check_schema(data, data["class"], source=path)
     try:
         return design_from_dict(data, str(path))
     except InputError as error:
@@ -93,7 +90,7 @@ def load_all(files: Iterable[Path], source: str | Path) -> list[Design]:
 
 def design_files(folder: str | Path) -> list[Path]:
     """The design files of a folder, in natural order. Raises InputError when there is none."""
-    folder = Path(folder)
+    folder = as_path(folder)
     if not os.path.isdir(folder):
         raise InputError(
             "is a file, expected a folder of designs"
@@ -120,6 +117,8 @@ def select_among(
     paths = list(paths)
     if select is None:
         return paths
+    if isinstance(select, (str, bool)) or not isinstance(select, (int, Sequence)):
+        raise InputError("expected a number, or a list of names", field="designs", value=select)
     if isinstance(select, int):
         if not 1 <= select <= len(paths):
             raise InputError(

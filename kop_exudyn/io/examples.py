@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import InputError
-from ..files.files import check_output_file, make_folder, read_bytes, write_bytes
+from ..files.files import as_path, check_output_file, make_folder, read_bytes, write_bytes
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 # Put there when a wheel is built, see setup.py.
@@ -33,7 +33,7 @@ def copy_examples(folder: str | Path, *, overwrite: bool = False) -> list[Path]:
     `overwrite` is false, or when the folder can't be written to.
     """
     files = example_files()
-    folder = Path(folder)
+    folder = as_path(folder)
     copies = [folder / file.parent.name / file.name for file in files]
     for copy in copies:
         if copy.parent.is_dir():

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..checks import check_kind
 from ..errors import InputError
 from ..files.documents import check_envelope, check_range, check_schema
 from ..files.json_files import read_json, write_json
@@ -59,6 +60,7 @@ def save_kit(path: str | Path, kit: Kit, *, overwrite: bool = False) -> Path:
 
     Raises InputError when the file exists and may not be replaced, or can't be written.
     """
+    check_kind("kit", kit, Kit, "see Kit, or the field kit of a KitResult")
     data: dict[str, Any] = {"format": "kop_exudyn/kit", "version": KIT_VERSION}
     if kit.units is not None:
         data["units"] = kit.units.to_dict()

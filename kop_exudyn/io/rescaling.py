@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..files.files import make_folder
+from ..files.files import as_path, make_folder
 from ..files.json_files import read_json, write_json
 from ..structures.base import rescaled
 
@@ -21,7 +21,7 @@ def save_rescaled(files: Sequence[Path], scales: Sequence[float], folder: str | 
     Files that they name, relative to themselves, are named relative to the new folder. Raises
     InputError where a design can't be rescaled or a file exists.
     """
-    folder = Path(folder)
+    folder = as_path(folder)
     content = []
     for file, scale in zip(files, scales):
         data = read_json(file)
@@ -40,10 +40,11 @@ def save_rescaled(files: Sequence[Path], scales: Sequence[float], folder: str | 
 def check_rescaled(files: Sequence[Path], folder: str | Path) -> None:
     """Raise InputError unless `save_rescaled` can write all of these to the folder, before any work
     is done for it."""
+    folder = as_path(folder)
     if os.path.exists(folder) and not os.path.isdir(folder):
         raise InputError("is a file, expected a folder to write to", source=folder)
     for file in files:
-        path = _new_file(file, Path(folder))
+        path = _new_file(file, folder)
         if os.path.exists(path):
             raise InputError("exists already: take another folder", source=path)
 

@@ -13,6 +13,7 @@ from ..equilibrium.equilibria import Equilibrium, Start
 from ..equilibrium.newton import solve
 from ..errors import InputError, SimulationFailure
 from ..files.arrays import numbers_of
+from ..files.files import as_path
 from ..kit.groups import ElementGroup
 from ..kit.optimality import ClusteringGap
 from ..kit.parts import Assignment, Kit
@@ -47,7 +48,7 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
     Raises InputError when the files are damaged or belong to other designs, SimulationFailure when
     an input design can't be simulated.
     """
-    folder = Path(folder)
+    folder = as_path(folder)
     path = folder / "result.json"
     data = load_result(path)
     if not (folder / "states.npz").exists():

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import InputError, did_you_mean
 from ..files.documents import LARGEST_WHOLE, check_envelope, check_range, check_schema
-from ..files.files import read_bytes
+from ..files.files import as_path, read_bytes
 from ..files.json_files import read_json
 from ..kit.kinds import kind_names, part_kind
 from ..kit.parts import Kit
@@ -38,7 +38,7 @@ def load_stock(path: str | Path, *, together: bool = False) -> Stock:
 
     Raises InputError naming the file, the row or field and the value when anything is wrong.
     """
-    path = Path(path)
+    path = as_path(path)
     if path.suffix.lower() == ".csv":
         rows, units = _csv_rows(path)
     else:

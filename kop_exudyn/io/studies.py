@@ -15,7 +15,7 @@ import numpy as np
 from ..analysis.verdict import VerdictSettings
 from ..errors import InputError
 from ..files.documents import check_envelope, check_range, check_schema
-from ..files.files import read_bytes
+from ..files.files import as_path, read_bytes
 from ..kit.kinds import Bounds, part_kind
 from ..search.requirements import Requirements
 from ..search.settings import JobSettings, StageSettings
@@ -75,7 +75,7 @@ def load_study(path: str | Path, select: int | Sequence[str] | None = None) -> S
     Raises InputError naming the file, the field and the value when anything is wrong; designs
     aren't read yet.
     """
-    path = Path(path)
+    path = as_path(path)
     study = _from_file(path) if is_study(path) else Study(path, tuple(design_files(path)))
     files = tuple(select_among(study.files, select, path))
     counts = dict(zip(study.files, study.counts or (1.0,) * len(study.files)))
@@ -93,7 +93,7 @@ def load_study(path: str | Path, select: int | Sequence[str] | None = None) -> S
 
 def is_study(path: str | Path) -> bool:
     """Whether this would be a study's file, and no folder of designs."""
-    path = Path(path)
+    path = as_path(path)
     return path.suffix.lower() == STUDY_SUFFIX and not os.path.isdir(path)
 
 

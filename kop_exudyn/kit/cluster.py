@@ -16,10 +16,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Parameters
+from ..checks import check_kind, check_whole
 from ..errors import InputError
 from .assign import to_assignment
 from .elements import KindElements, Labels, Penalties, collect
-from .groups import ElementGroup
+from .groups import ElementGroup, check_groups
 from .intervals import optimal_centres
 from .kinds import Bounds, part_kind
 from .parts import Assignment, Kit
@@ -63,6 +64,10 @@ def cluster(
     parts repeat. Raises InputError for more parts than elements, kinds without a number of parts or
     without elements, empty bounds.
     """
+    check_whole("restarts", restarts, least=1)
+    check_whole("seed", seed)
+    check_kind("parts", parts, Mapping, "kind of part -> number of parts")
+    check_groups(groups, q)
     elements = collect(groups, q, penalties=penalties)
     rounded = collect(groups, _rounded(groups, q), penalties=penalties)
     _check_request(elements, parts)
@@ -71,7 +76,7 @@ def cluster(
     found, labels, energy = {}, {}, {}
     for name, e in elements.items():
         limits, near = e.kind.bounds(bounds), rounded[name]
-        best = _best_found(near, parts[name], limits, max(restarts, 1), seed)
+        best = _best_found(near, parts[name], limits, restarts, seed)
         if e.exact:
             best = best_parts(e, best, near.nearest(best), *limits)
         canonical = e.kind.canonical(best)

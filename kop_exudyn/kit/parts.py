@@ -5,20 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import Indices, KitVector, ParameterFlags, Parameters, Parts
+from ..arrays import Indices, KitVector, NumbersLike, ParameterFlags, Parameters, Parts, RowsLike
+from ..checks import check_kind
+from ..equality import ByValue
 from ..errors import InputError
 from ..units import Units
 from .groups import ElementGroup
 from .kinds import PartKind, Variants, part_kind
 
 
-@dataclass(frozen=True)
-class Kit:
+@dataclass(frozen=True, eq=False)
+class Kit(ByValue):
     """Parts by kind.
 
     parts : kind -> (m, k_p) parameters of its parts; lengths in the designs' unit, angles in
@@ -32,7 +34,16 @@ class Kit:
     parts: Mapping[str, Parts]
     units: Units | None = None
 
+    if TYPE_CHECKING:  # lists are welcome too
+
+        def __init__(
+            self, parts: Mapping[str, NumbersLike | RowsLike], units: Units | None = None
+        ) -> None: ...
+
     def __post_init__(self) -> None:
+        check_kind("parts", self.parts, Mapping, "kind -> parts")
+        if self.units is not None:
+            check_kind("units", self.units, Units)
         checked = {name: _checked(part_kind(name), self.parts[name]) for name in sorted(self.parts)}
         object.__setattr__(self, "parts", checked)
 
@@ -43,7 +54,7 @@ class Kit:
 
     def __getitem__(self, kind: str) -> Parts:
         """(m, k_p) parts of a kind; InputError when the kit has none."""
-        if kind not in self.parts:
+        if not isinstance(kind, str) or kind not in self.parts:
             raise InputError("the kit has no parts of this kind", field="kit", value=kind)
         return self.parts[kind]
 
@@ -66,6 +77,10 @@ class Kit:
     def with_vector(self, p: KitVector) -> Kit:
         """The kit with other parameters p (n_p,)."""
         p = np.asarray(p, dtype=float)
+        if p.shape != self.vector.shape:
+            raise InputError(
+                f"expected the kit's {self.vector.size} numbers, got the shape {p.shape}", field="p"
+            )
         return Kit(
             {
                 name: p[start : start + self.parts[name].size].reshape(self.parts[name].shape)
@@ -139,8 +154,8 @@ def _checked(kind: PartKind, values: Any) -> np.ndarray:
     return parts
 
 
-@dataclass(frozen=True)
-class Assignment:
+@dataclass(frozen=True, eq=False)
+class Assignment(ByValue):
     """Which part realises each element, and in which variant.
 
     groups : the elements

@@ -10,6 +10,7 @@ from typing import Any
 from PIL import Image
 
 from ..analysis.verdict import Buildable
+from ..checks import check_kind
 from ..drawing.style import figure_bytes
 from ..fabrication.pieces import parts_list_of
 from ..files.files import make_folder, write_bytes
@@ -74,6 +75,7 @@ def write_kit_report(
 
     Returns the page's path. Raises InputError when a file can't be written.
     """
+    check_kind("result", result, KitResult, "see optimize_kit and load_run")
     folder = make_folder(folder)
     content = result.to_dict() | {"environment": environment()}
     save_result(folder / "result.json", content, overwrite=True)

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..analysis.simulation import SimulationResult
+from ..checks import check_kind
 from ..search.result import KitResult
 from .designs import DrawnDesign, DrawnState, draw_designs
 from .kit_drawings import drawn_designs
@@ -20,6 +21,7 @@ def plot(result: SimulationResult | KitResult) -> Figure:
 
     Returns a matplotlib figure: notebooks show it, `figure.savefig("picture.png")` keeps it.
     """
+    check_kind("result", result, (SimulationResult, KitResult))
     if isinstance(result, KitResult):
         return draw_designs(drawn_designs(result))
     design, role = result.design, result.design.fitted_role.name

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from ..checks import check_kind
 from ..kit.kinds import part_kind
-from ..sqp.constraints import LinearConstraints
+from ..sqp.constraints import LinearConstraints, validate_bounds
 from ..sqp.options import SQPOptions
 from ..sqp.problem import Derivatives, Point
 from ..sqp.solver import minimise
@@ -73,7 +74,11 @@ def fit_input(
     Raises InputError for bounds that exclude each other, SimulationFailure when the input can't be
     simulated.
     """
-    objective = DesignObjective(design, weights or Weights(fit=design.fit_weight))
+    check_kind("design", design, Design, "see load_design")
+    weights = Weights(fit=design.fit_weight) if weights is None else weights
+    check_kind("weights", weights, Weights, "Weights.of takes names and numbers")
+    lower, upper = validate_bounds(lower, upper, len(design.parameters), "fit_input")
+    objective = DesignObjective(design, weights)
     problem = OwnProblem(objective, lower, upper)
     start = np.clip(design.parameters, problem.lower, problem.upper)
     result = minimise(problem, start, SQPOptions(max_steps=max_steps, decrease_tolerance=tolerance))

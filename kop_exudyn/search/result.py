@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Indices
-from ..errors import SimulationFailure
+from ..checks import check_choice, check_whole
+from ..errors import InputError, SimulationFailure
 from ..kit.optimality import ClusteringGap
 from ..kit.parts import Assignment, Kit
 from ..kit.reuse import PieceCount
@@ -20,6 +21,7 @@ from ..structures.opening import SAME_STATE
 from ..structures.stacking import group_designs
 from ..structures.strength import strength_summary
 from ..units import Units, common_units
+from ..wording import counted
 from .evaluation import Evaluation, distance
 from .events import Stage, StageEvent, events_to_list
 from .objective import Reference
@@ -114,12 +116,15 @@ class KitResult:
 
     def summary(self, stage: str, number: int) -> dict[str, Any]:
         """Fit, energy and confirmation of one design after a stage, or {"failed": why}."""
+        check_choice("stage", stage, self.stages)
+        self._check_number(number)
         outcome = self.stages[stage].designs[number]
         return summary_of(outcome, self.designs[number], self.references[number])
 
     def input_summary(self, number: int) -> dict[str, Any]:
         """Fit and energy of one input design: what of a stage's deviation no kit is to blame
         for."""
+        self._check_number(number)
         design, reference = self.designs[number], self.references[number]
         state = reference.equilibria[design.fitted_role.name].state
         fit = TargetFitting(reference.target).minimum_zone(state.positions[design.joints])
@@ -134,6 +139,9 @@ class KitResult:
 
         {"failed": why} where that deployment (or the design) failed.
         """
+        self._check_number(number)
+        if not self.redeployed:
+            raise InputError("the designs were not opened in this run", field="redeployed")
         opened, kept = self.redeployed[number], self.stages["assigned"].designs[number]
         if isinstance(opened, SimulationFailure):
             return {"failed": str(opened)}
@@ -151,6 +159,15 @@ class KitResult:
             "energy_ratio": energy / self.references[number].energy,
             "exudyn": opened.confirmations[role].to_dict() if opened.confirmations else None,
         }
+
+    def _check_number(self, number: int) -> None:
+        check_whole("number", number)
+        if number >= len(self.designs):
+            raise InputError(
+                f"there are {counted(len(self.designs), 'design')}, numbered from 0",
+                field="number",
+                value=number,
+            )
 
     def to_dict(self) -> dict[str, Any]:
         """As result.json has it."""

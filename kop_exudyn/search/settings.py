@@ -5,7 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..checks import check_choice, check_flag, check_not_negative, check_positive, check_whole
+from ..checks import (
+    check_choice,
+    check_flag,
+    check_not_negative,
+    check_positive,
+    check_whole,
+    numbers,
+)
 from ..errors import InputError
 from ..kit.kinds import Bounds, kind_names, part_kind
 from ..sqp.constraints import LinearConstraints
@@ -99,7 +106,7 @@ class StageSettings:
     Raises InputError, with the field and its value.
     """
 
-    schedule: tuple[float, ...] | None = None
+    schedule: Sequence[float] | None = None
     tight: float = 1e-3
     relaxed_steps: int = 25
     assigned_steps: int = 40
@@ -128,12 +135,12 @@ class StageSettings:
 
     def __post_init__(self) -> None:
         if self.schedule is not None:
-            if not isinstance(self.schedule, Sequence) or not self.schedule:
-                raise InputError(
-                    "must be one number or more", field="schedule", value=self.schedule
-                )
-            for n, weight in enumerate(self.schedule):
+            given = numbers("schedule", self.schedule)
+            if not given:
+                raise InputError("must be one number or more", field="schedule")
+            for n, weight in enumerate(given):
                 check_positive(f"schedule[{n}]", weight)
+            object.__setattr__(self, "schedule", given)
         for name in _POSITIVE:
             check_positive(name, getattr(self, name))
         for name in _COUNTS:
@@ -170,7 +177,7 @@ class JobSettings:
     """
 
     weights: Weights | None = None
-    design_weights: tuple[float, ...] | None = None
+    design_weights: Sequence[float] | None = None
     stages: StageSettings = StageSettings()
     jobs: int = 2
     baselines: bool = True
@@ -178,9 +185,11 @@ class JobSettings:
     scheduler: str | None = None
 
     def __post_init__(self) -> None:
-        given = () if self.design_weights is None else self.design_weights
-        for n, weight in enumerate(given):
-            check_positive(f"design_weights[{n}]", weight)
+        if self.design_weights is not None:
+            given = numbers("design_weights", self.design_weights)
+            for n, weight in enumerate(given):
+                check_positive(f"design_weights[{n}]", weight)
+            object.__setattr__(self, "design_weights", given)
         check_whole("jobs", self.jobs, least=1)
         check_flag("baselines", self.baselines)
         check_flag("published", self.published)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import check_not_negative
+from ..checks import check_kind, check_not_negative, check_whole
 from ..equilibrium.equilibria import Equilibrium
 from ..equilibrium.sensitivities import Sensitivities
 from ..errors import SimulationFailure
@@ -127,6 +127,11 @@ def sample_spread(
     sample with its reason. What ends where its sensitivities say has not snapped; anything else has
     to come back when the errors are undone.
     """
+    check_kind("design", design, Design, "see load_design")
+    check_kind("evaluation", evaluation, Evaluation)
+    check_kind("tolerance", tolerance, Tolerance)
+    check_whole("number", number)
+    check_whole("seed", seed)
     objective = DesignObjective(design) if objective is None else objective
     sets = _sets(design, tolerance, number, np.random.default_rng(seed))
     return list(_samples(objective, evaluation, sets, confirmed))

@@ -102,13 +102,32 @@ def on_elements(
     """
     import cvxpy as cp
 
+    for design in designs:
+        if not (hasattr(design, "name") and hasattr(design, "parameters")):
+            raise InputError("expected designs", field="designs", value=type(design).__name__)
     offsets = np.cumsum([0, *(len(design.parameters) for design in designs)])
     variable = cp.Variable(int(offsets[-1]), name="q")
-    parts = {design.name: variable[a:b] for design, a, b in zip(designs, offsets, offsets[1:])}
-    found = from_cvxpy(statement(parts), variable)
+    parts = _Named((d.name, variable[a:b]) for d, a, b in zip(designs, offsets, offsets[1:]))
+    stated = statement(parts)
+    if not isinstance(stated, Sequence):
+        raise InputError(
+            "expected a function that returns a list of constraints",
+            field="statement",
+            value=type(stated).__name__,
+        )
+    found = from_cvxpy(stated, variable)
     free = np.full(variable.size, np.inf)
     check_feasible(-free, free, found)
     return found
+
+
+class _Named(dict[str, Any]):
+    """The designs' parameters; a name that isn't there is the caller's error."""
+
+    def __missing__(self, name: str) -> Any:
+        raise InputError(
+            f"no such design (known: {', '.join(self)})", field="statement", value=name
+        )
 
 
 def validate_bounds(
@@ -121,7 +140,12 @@ def validate_bounds(
     """
     result = []
     for side, value in (("lower", lower), ("upper", upper)):
-        array = np.asarray(value, dtype=float)
+        try:
+            array = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(
+                "expected numbers", field=f"{field}.{side}", value=type(value).__name__
+            ) from None
         if array.shape not in ((), (n,)):
             raise InputError(
                 f"has the shape {array.shape}, expected ({n},)", field=f"{field}.{side}"

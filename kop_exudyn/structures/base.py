@@ -18,6 +18,8 @@ import numpy as np
 
 from ..arrays import Indices, Numbers, Parameters, Points, Triangles, Vector
 from ..errors import InputError, did_you_mean
+from ..files.documents import check_range, check_schema, has_schema
+from ..files.json_files import plain
 from ..geometry.triangles import TriangleSurface
 from ..kit.groups import ElementGroup
 from ..plugins import Registry
@@ -37,8 +39,10 @@ if TYPE_CHECKING:
 _WORKSPACES = "_workspaces"  # of the solver, by thread
 
 
-# An engine's way from a start to an equilibrium, with the parameters of `equilibrium.newton.solve`.
 _NO_FILE = "design"  # what errors begin with where the content is of no file
+# what files have to say of themselves, and contents that scripts make need not
+_ENVELOPE = {"format": "kop_exudyn/design", "version": 1}
+# An engine's way from a start to an equilibrium, with the parameters of `equilibrium.newton.solve`.
 Solve = Callable[..., "Equilibrium"]
 
 
@@ -137,6 +141,25 @@ class Design(ABC):
     def scene(self, role: str) -> Scene:
         """The scene of one of the roles; the same object at every call."""
 
+    def checked(self, q: Parameters | None) -> Parameters:
+        """(nq,) parameters that a caller gives, or the input's in place of None. Raises InputError
+        for another number of them, and for what isn't finite."""
+        if q is None:
+            return self.parameters
+        try:
+            given = np.asarray(q, float)
+        except (TypeError, ValueError):
+            raise InputError("expected numbers", field="q", value=type(q).__name__) from None
+        if given.shape != self.parameters.shape:
+            raise InputError(
+                f"expected the {len(self.parameters)} parameters of {self.name}, got an array of "
+                f"the shape {given.shape}",
+                field="q",
+            )
+        if not np.isfinite(given).all():
+            raise InputError("must be finite", field=f"q[{int(np.argmin(np.isfinite(given)))}]")
+        return given
+
     @abstractmethod
     def deploy(
         self, q: Parameters | None = None, solve: Solve | None = None
@@ -144,6 +167,7 @@ class Design(ABC):
         """Equilibria of all roles from the design's own starting geometry (no warm start), at q
         (default: the input).
 
+        q : (nq,), see `checked`
         solve : of an engine, as `equilibrium.newton.solve`, which is the default
 
         Their `iterations` and `wall_s` count all solves that led to them (see `Equilibrium.after`).
@@ -192,10 +216,22 @@ class Design(ABC):
         return None
 
     @property
+    def doubts(self) -> list[str]:
+        """What looks like a mistake in the design's own data, in words, as imports and simulations
+        tell it."""
+        return []
+
+    @property
     def cautions(self) -> list[str]:
         """What else to know of the design before a kit is sought for it, in words, as `kop check`
         prints them."""
         return []
+
+    @property
+    def file_origin(self) -> Vector:
+        """(3,) where the coordinates of the design's own file begin in those of its user's other
+        files: what `report_positions` lacks of them."""
+        return self.origin - self.middle
 
     @property
     def fitted_role(self) -> Role:
@@ -339,26 +375,36 @@ def class_names() -> list[str]:
 def design_from_dict(data: Mapping[str, Any], source: str = _NO_FILE) -> Design:
     """Make the design that a design file's content describes.
 
-    data : the content, as the class's schema describes it
+    data : the content, as the class's schema describes it; arrays and tuples are lists
     source : name of the file, which errors begin with and files that it names lie beside
 
     Raises InputError when the class is unknown or a field is missing, unknown or unusable.
     """
-    class_name = data.get("class") if isinstance(data, Mapping) else None
+    if not isinstance(data, Mapping):
+        raise InputError("expected a design file's content", source=source, value=data)
+    data = plain(data, finite=False)
+    check_range(data, source)
+    check_schema({**_ENVELOPE, **data}, "design", source)
+    class_name = data["class"]
     reader = CLASSES.get(class_name)
     if reader is None:
         raise InputError(
-            f"unknown structure class ({did_you_mean(str(class_name), class_names())}"
+            f"unknown structure class ({did_you_mean(class_name, class_names())}"
             f"known: {', '.join(class_names())})",
             source=source,
             field="class",
             value=class_name,
         )
+    if has_schema(class_name):
+        check_schema({**_ENVELOPE, **data}, class_name, source)
     try:
         near, middle = centred(data)
     except InputError as error:
         raise error.at(source) from None
-    design = reader(near, source)
+    try:
+        design = reader(near, source)
+    except InputError as error:
+        raise error.moved(lambda place: np.add(place, middle[: len(place)])) from None
     if middle.any():
         design.middle = middle
     design.source = None if source == _NO_FILE else str(source)

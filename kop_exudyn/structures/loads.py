@@ -5,12 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..arrays import Indices, Numbers, Points, Vector
+from ..arrays import Indices, Numbers, NumbersLike, Points, RowsLike, Vector
 from ..checks import check_positive
+from ..equality import ByValue
 from ..errors import InputError
 from ..geometry.cells import cells_between, shares_of
 
@@ -81,8 +82,8 @@ def _sum(first: np.ndarray | None, second: np.ndarray | None) -> np.ndarray | No
     return first + second
 
 
-@dataclass(frozen=True)
-class LoadCase:
+@dataclass(frozen=True, eq=False)
+class LoadCase(ByValue):
     """Loads on the deployed state, in the design's own axes; lists become arrays.
 
     gravity : (3,) acceleration that gives the rods their weight, or None
@@ -109,6 +110,22 @@ class LoadCase:
     line: Vector | None = None
     area: Vector | None = None
     plan: Vector | None = None
+
+    if TYPE_CHECKING:  # lists are welcome too
+
+        def __init__(
+            self,
+            gravity: NumbersLike | None = None,
+            joints: NumbersLike = (),
+            forces: RowsLike = (),
+            supports: NumbersLike | None = None,
+            name: str = FILE_LOADS,
+            factor: float = 1.0,
+            deflection: DeflectionLimit | Mapping[str, float] = DeflectionLimit(),
+            line: NumbersLike | None = None,
+            area: NumbersLike | None = None,
+            plan: NumbersLike | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         for name, kind in (

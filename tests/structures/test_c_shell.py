@@ -231,7 +231,7 @@ BARE = {
         ),
         (
             [[[0, 0], [2, 0]], [[0, 1], [2, float("nan")]]],
-            r"curves\[1\].points: contains numbers that are not finite",
+            r"curves\[1\].points\[1\]\[1\] = nan: must be finite",
         ),
         ([[[0, 0], [2, 0]], [[0.5, -1], [0.5, 1]]], r"curves\[0\].points: nothing is left"),
         (

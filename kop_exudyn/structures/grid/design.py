@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...checks import check_choice
 from ...errors import InputError, SimulationFailure
 from ...geometry.centring import middle_of, moved
 from ...geometry.extent import size_of_points
@@ -98,6 +99,7 @@ class Grid(Design):
         )
 
     def scene(self, role: str = "deployed") -> Scene:
+        check_choice("role", role, ("deployed",))
         return self._model.scene
 
     def deploy(
@@ -106,11 +108,9 @@ class Grid(Design):
         """The equilibrium nearest to the design surface: solved from the lamellas' places there."""
         from ...equilibrium.newton import solve as fast
 
-        solve = fast if solve is None else solve
+        solve, q = fast if solve is None else solve, self.checked(q)
         try:
-            return {
-                "deployed": solve(self.systems["deployed"], self.parameters if q is None else q)
-            }
+            return {"deployed": solve(self.systems["deployed"], q)}
         except SimulationFailure as failure:
             hint = (
                 ""

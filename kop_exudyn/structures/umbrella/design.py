@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...checks import check_choice
 from ...errors import InputError
 from ...geometry.centring import middle_of, moved
 from ...geometry.extent import size_of_points
@@ -146,6 +147,7 @@ class Umbrella(Design):
     def scene(self, role: str = "deployed") -> Scene:
         """The final state's scene: actuators of weight 1, no attraction, on pins or held in
         place."""
+        check_choice("role", role, ("deployed",))
         return self.held if self.pins is None else self._pinned
 
     @cached_property
@@ -185,8 +187,7 @@ class Umbrella(Design):
         """
         if q is None and solve is None:
             return {"deployed": self.deployed}  # solved for once, whoever asks
-        q = self.parameters if q is None else np.asarray(q, float)
-        return {"deployed": self._opened(q, solve)}
+        return {"deployed": self._opened(self.checked(q), solve)}
 
     def _opened(self, q: np.ndarray, solve: Solve | None = None) -> Equilibrium:
         from .opening import Opening
