@@ -63,8 +63,8 @@ def test_no_steps_at_all_are_refused(name):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"schedule": ()}, "schedule = (): must be one number or more"),
-        ({"schedule": 3.0}, "schedule = 3.0: must be one number or more"),
+        ({"schedule": ()}, "schedule: must be one number or more"),
+        ({"schedule": 3.0}, "schedule = 3.0: expected a list of numbers"),
         ({"schedule": (1.0, -1.0)}, "schedule[1] = -1.0: must be a positive number"),
         ({"hessian": "exakt"}, "hessian = 'exakt': unknown (did you mean 'exact'? known: "),
         ({"effort": 3}, "effort = 3: unknown (known: quick, normal, thorough)"),

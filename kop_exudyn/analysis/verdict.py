@@ -197,7 +197,7 @@ def judge(
     """
     design = objective.design
     if isinstance(kept, SimulationFailure):
-        helps = "more parts of each kind, or another seed, may find one"
+        helps = "more or other parts of each kind, or another seed, may find one"
         return Buildable(design.name, stops=(Stop("not found", f"no state: {kept}", helps),))
     stops = []
     moved: float | None = None

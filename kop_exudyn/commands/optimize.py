@@ -317,6 +317,7 @@ def _smallest(args: argparse.Namespace, study: Study, parts: dict[str, int]) -> 
         resume=args.resume,
         overwrite=args.overwrite,
         progress=shows_progress(args),
+        verdict=study.verdict,
     )
     page = args.out / "index.html"
     row = chosen.row(cost)

@@ -82,6 +82,7 @@ def run(args: argparse.Namespace) -> int:
         resume=args.resume,
         overwrite=args.overwrite,
         progress=shows_progress(args),
+        verdict=study.verdict,
     )
     page = args.out / "index.html"
     warnings = list(kits[0].result.warnings)

@@ -10,7 +10,7 @@ from typing import Any
 from ..analysis.simulation import SimulationResult
 from ..checks import check_choice, check_kind, choices
 from ..fabrication.pieces import PartsList, parts_list_of
-from ..files.files import file_stem, make_folder, write_text
+from ..files.files import file_stem, file_stems, make_folder, write_text
 from ..files.tables import write_csv
 from ..search.evaluation import Evaluation
 from ..search.result import KitResult
@@ -66,12 +66,13 @@ def export_desk(
     check_choice("stage", stage, result.stages)
     outcomes = result.stages[stage].designs
     folder, parts = make_folder(folder), parts_list_of(result)
+    stems = file_stems([design.name for design in result.designs])
     done = []
     for number, outcome in enumerate(outcomes):
         if isinstance(outcome, Evaluation):
             target = result.references[number].target
             states = list(states_of_kit(parts, number, outcome, target))
-            stem = f"{file_stem(result.designs[number].name)}_{stage}"
+            stem = f"{stems[result.designs[number].name]}_{stage}"
             done += _write_states(states, target, folder, stem, formats, parts, overwrite)
     if "csv" in formats:
         tables = result_tables(result) | {"parts": part_rows(parts)}

@@ -64,7 +64,7 @@ def _cell_steps(blanks: Blanks, pieces: DesignPieces) -> Iterator[dict[str, Any]
     hardware = pieces.design.hardware
     assert hardware is not None
     placed, arms = PlacedPieces.of(pieces), Counter(arm.parameter for arm in hardware.arms)
-    yield {"action": "lay up arms: board 2 on board 1, the plates' pin holes over each other"}
+    yield {"action": "lay up arms: board 2 on board 1, labels up, edges flush"}
     yield {"action": "put an ear into a plate's slot wherever an arm comes, on the inner face"}
     for piece in pieces.pieces:
         names, sort = part_kind(piece.kind).parameter_names, sorts_of_arms(piece, hardware)
@@ -114,20 +114,24 @@ def _pins(cells: CellParts) -> list[dict[str, Any]]:
     """Pins of cells: one a hinge at a plate, one through each crossing, two lock every beam."""
     t, width = cells.thickness, cells.width
     apart = 2 * abs(cells.scale * cells.hardware[0].arm_position)
+    hinges = [len(hardware.arms) for hardware in cells.hardware]
+    crossings = [hardware.crossings for hardware in cells.hardware]
     rows = (
-        ("hinge pin, plates", cells.pin, width + t, cells.hinges),
-        ("axle, crossings", cells.pin, apart + width, cells.crossings),
-        ("locking pin, crossings", t / 4, width, 4 * cells.crossings),
+        ("hinge pin, plates", cells.pin, width + t, hinges),
+        ("axle, crossings", cells.pin, apart + width, crossings),
+        ("locking pin, crossings", t / 4, width, [4 * number for number in crossings]),
     )
+    names = [pieces.design.name for pieces in cells.parts.designs]
     return [
         {
             "item": item,
             "diameter_mm": diameter,
             "clamps_mm": round(clamped, 2),
             "length_mm": round(clamped + 2 * _SPARE * diameter, 1),
-            "pieces": number,
+            "pieces": max(numbers),
+            **{f"in_{name}": number for name, number in zip(names, numbers)},
         }
-        for item, diameter, clamped, number in rows
+        for item, diameter, clamped, numbers in rows
     ]
 
 

@@ -92,14 +92,16 @@ def _tiles(size: np.ndarray, inner: np.ndarray, scale: float) -> tuple[np.ndarra
 
 
 def save_assembly_drawing(
-    drawing: AssemblyDrawing, folder: str | Path, *, overwrite: bool = False
+    drawing: AssemblyDrawing, folder: str | Path, stem: str = "", *, overwrite: bool = False
 ) -> list[Path]:
     """Write assembly_DESIGN.svg, all of it on one sheet; returns its path.
 
+    stem : of the design's name, default: see `file_stem`
+
     Raises InputError when a file can't be written.
     """
-    stem = make_folder(folder) / f"assembly_{file_stem(drawing.name)}"
-    return save_figure(draw_assembly(drawing), stem, ("svg",), overwrite=overwrite)
+    path = make_folder(folder) / f"assembly_{stem or file_stem(drawing.name)}"
+    return save_figure(draw_assembly(drawing), path, ("svg",), overwrite=overwrite)
 
 
 def draw_assembly(drawing: AssemblyDrawing) -> Figure:

@@ -5,8 +5,11 @@ holes, and are laid up of two boards half as thick as the arm is wide. The pin a
 one face of the arm, that at the crossing on the same (a) or on the opposite one (b). At a crossing
 two arms make one straight beam that turns about the pin: each has a disc there on one of its two
 boards only, so that the discs of the two lie side by side, and two more pins through both keep the
-beam straight. A plate is a triangle with a notch at every hinge, in which the arm's lug turns, and
-beside it an *ear* with the pin, whose tab sits in the plate.
+beam straight. For that all arms are drawn with the crossing's pin on the same face, and laid up
+alike, board 2 on board 1: the two arms of a beam come from opposite sides, with the pin's face in
+common, so that the one's lower board is on the side of the other's upper one. A plate is a triangle
+with a notch at every hinge, in which the arm's lug turns, and beside it an *ear* with the pin,
+whose tab sits in the plate.
 
 All sizes follow from the thickness t of plates and arms: pins of t / 2 (or the joint
 holes asked for, where these are smaller), lugs and ears of 3 t / 2, discs of 2 t, locking pins of
@@ -32,7 +35,8 @@ from .shapes import Hole, Polyline, Shape, Template, Text
 _LUG = 0.75  # of the thickness: radius of lugs and ears
 _DISC = 1.0  # of the thickness: radius of the discs at crossings
 _LOCK = (0.65, 0.25)  # of the thickness: how far locking pins are from the axis, and their diameter
-_TAB = (1.0, 2.5)  # of the thickness: where an ear's tab begins and ends, inwards from the edge
+_TAB = (1.75, 3.0)  # of the thickness: where an ear's tab begins and ends, inwards from the edge
+_WALL = 0.5  # of the thickness: what is left of a plate between two cuts at least
 _CHORDS = 12  # of a quarter circle
 
 
@@ -49,7 +53,8 @@ class ArmPart:
     label : as "C1 top a"
     by_design : arms of each design
     length : from pin to pin along the arm, mm
-    offsets : of the pins from the arm's axis, mm
+    offsets : of the pins at the plate and at the crossing from the arm's axis, mm, as boards are
+        drawn
     """
 
     label: str
@@ -114,6 +119,8 @@ class CellParts:
                 f"arms {self.width:g} mm wide have no room at plate edges of "
                 f"{self.scale * h.edge:.1f} mm"
             )
+        else:
+            found += self._plate_problems()
         short = [
             arm for arm in self.arms if arm.length < (_DISC + _LUG) * t + self.options.clearance
         ]
@@ -137,7 +144,7 @@ class CellParts:
             side = self.thickness / 2
             by_design = tuple(counts[sort] for counts in self.counts)
             found.append(
-                ArmPart(label, by_design, length, (-side, side if letter == "b" else -side))
+                ArmPart(label, by_design, length, (side if letter == "b" else -side, -side))
             )
         return tuple(found)
 
@@ -164,10 +171,6 @@ class CellParts:
         """Arms of the neediest design: each has a hinge at a plate."""
         return max(len(h.arms) for h in self.hardware)
 
-    @property
-    def crossings(self) -> int:
-        return max(h.crossings for h in self.hardware)
-
     @staticmethod
     def _columns(kind: str) -> tuple[str, ...]:
         return part_kind(kind).parameter_names
@@ -183,7 +186,7 @@ class CellParts:
         """One of an arm's two boards: x along the arm from the plate's pin, y across it."""
         t, c, length = self.thickness, self.options.clearance, arm.length
         at_plate, at_crossing = (np.array([x, y]) for x, y in zip((0.0, length), arm.offsets))
-        end = length if with_disc else length - _DISC * t - c
+        end = length if with_disc else max(length - _DISC * t - c, t)  # see `problems`
         shape = shapely.union_all([
             shapely.box(0.0, -t / 2, end, t / 2),
             _round(at_plate, _LUG * t),
@@ -205,33 +208,59 @@ class CellParts:
     def _plate(self) -> Template:
         """A plate, seen from outside: a triangle, on each edge a notch for arm and ear, and the
         slot of the ear's tab."""
-        h, t, c = self.hardware[0], self.thickness, self.options.clearance
-        edge, at = self.scale * h.edge, self.scale * h.arm_position
+        t, edge = self.thickness, self.scale * self.hardware[0].edge
         inradius = edge / (2 * np.sqrt(3))
-        low, high = at - self.width / 2 - c, at + self.width / 2 + c
-        low = min(low, at + self.width / 2 + c)
-        ear = self._ear_at()
-        notch = shapely.box(
-            min(low, ear - t / 2 - c), -inradius - 1.0, high, -inradius + _LUG * t + c
-        )
+        shape, slots = self._plate_cuts
+        shapes: list[Shape] = [_outline(shape), *map(_outline, slots)]
+        shapes.append(Text(np.zeros(2), min(0.3 * inradius, 5.0), "P"))
+        name = f"edge {tenths(edge)}, hinge pins along the edges at the inner face"
+        by_design = tuple(h.plates for h in self.hardware)
+        return Template("P", name, self.plates, tuple(shapes), t, by_design)
+
+    @cached_property
+    def _plate_cuts(self) -> tuple[shapely.Geometry, list[shapely.Geometry]]:
+        """A plate's outline, and the slots in it. Tips at its corners that would hang on less than
+        the least wall are cut off."""
+        h, t, c = self.hardware[0], self.thickness, self.options.clearance
+        edge, at, ear = self.scale * h.edge, self.scale * h.arm_position, self._ear_at()
+        inradius = edge / (2 * np.sqrt(3))
+        sides = [at - self.width / 2 - c, at + self.width / 2 + c, ear - t / 2 - c, ear + t / 2 + c]
+        notch = shapely.box(min(sides), -inradius - 1.0, max(sides), -inradius + _LUG * t + c)
         slot = shapely.box(
             ear - t / 2 - c / 2,
             -inradius + _TAB[0] * t - c / 2,
             ear + t / 2 + c / 2,
             -inradius + _TAB[1] * t + c / 2,
         )
+        notches, slots = (
+            [affinity.rotate(cut, 120 * k, origin=(0, 0)) for k in range(3)]
+            for cut in (notch, slot)
+        )
         triangle = shapely.Polygon(
             [[-edge / 2, -inradius], [edge / 2, -inradius], [0.0, 2 * inradius]]
         )
-        shape, slots = triangle, []
-        for k in range(3):
-            shape = shape - affinity.rotate(notch, 120 * k, origin=(0, 0))
-            slots.append(affinity.rotate(slot, 120 * k, origin=(0, 0)))
-        shapes: list[Shape] = [_outline(shape), *map(_outline, slots)]
-        shapes.append(Text(np.zeros(2), min(0.3 * inradius, 5.0), "P"))
-        name = f"edge {tenths(edge)}, hinge pins along the edges at the inner face"
-        by_design = tuple(h.plates for h in self.hardware)
-        return Template("P", name, self.plates, tuple(shapes), t, by_design)
+        thin = _WALL * t / 2
+        whole = _largest(triangle - shapely.union_all(notches), triangle)
+        core = _largest(whole.buffer(-thin, join_style="mitre"), whole)
+        shape = _largest(core.buffer(thin, join_style="mitre") & whole, whole)
+        return shape, slots
+
+    def _plate_problems(self) -> list[str]:
+        """What is too thin in a plate to hold its ears."""
+        shape, slots = self._plate_cuts
+        t, c = self.thickness, self.options.clearance
+        if not all(shape.contains(slot) for slot in slots):
+            wall = 0.0
+        else:
+            wall = min(shape.exterior.distance(slot) for slot in slots)
+            wall = min([wall, *(a.distance(b) for a, b in zip(slots, slots[1:] + slots[:1]))])
+        if wall >= _WALL * t:
+            return []
+        return [
+            f"plates of {tenths(self.scale * self.hardware[0].edge)} mm have walls of only "
+            f"{wall:.2g} mm beside the ears' slots, at a clearance of {c:g} mm: at least "
+            f"{tenths(_WALL * t)} mm, half of their thickness, hold a tab"
+        ]
 
     def _ear_at(self) -> float:
         """Place of an ear's middle along a plate's edge: beside the arm, on the edge's middle's
@@ -255,6 +284,12 @@ class CellParts:
         )
         by_design = tuple(len(h.arms) for h in self.hardware)
         return Template("E", "hinge beside an arm", self.hinges, shapes, t, by_design)
+
+
+def _largest(shape: shapely.Geometry, otherwise: shapely.Polygon) -> shapely.Polygon:
+    """Its largest part; another shape where nothing is left."""
+    parts = [p for p in shapely.get_parts(shape) if isinstance(p, shapely.Polygon) and p.area]
+    return max(parts, key=shapely.area, default=otherwise)
 
 
 def _round(centre: np.ndarray, radius: float) -> shapely.Polygon:

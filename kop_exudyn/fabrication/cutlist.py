@@ -54,6 +54,8 @@ def cut_list(blanks: Blanks, tolerances: Tolerances = Tolerances()) -> list[dict
             if label in strips:
                 row |= _sawn(strips[label])
             row |= _dimensions(kind, value, blanks.scale, tolerances)
+            if label in strips:  # with slits, the longest: what is sawn goes by these
+                row |= {f"l{k}_mm": _mm(side) for k, side in enumerate(strips[label].sides, 1)}
             row |= {
                 f"bars_{bar.label.removeprefix(label).strip()}": bar.count
                 for bar in blanks.bars
@@ -130,10 +132,11 @@ def purchases(
 ) -> list[dict[str, Any]]:
     """One row a size of bars and sheets to buy: how many, their length in m or area in m2.
 
-    Where straight pieces may come from either (see `sources`), sheets hold them as well, and bars
-    are bought instead.
+    Where straight pieces may come from either (see `sources`), some sheets hold them alone, and
+    bars are bought instead of these.
     """
     either = sources(blanks).either
+    straight = {label for label, _, _ in blanks.straight}
     rows: list[dict[str, Any]] = []
     for length, number in (plan.counts if plan is not None else {}).items():
         rows.append(
@@ -145,17 +148,19 @@ def purchases(
                 "length_m": round(number * length / 1000, 3),
             }
         )
-    sizes = Counter((*sheet.size, sheet.thickness) for sheet in sheets)
-    for (width, height, thickness), number in sizes.items():
-        rows.append(
-            {
-                "item": f"to buy: sheets of {width:g} x {height:g} mm, "
-                f"{'for all parts' if either else 'as drawn'}",
-                "section_mm": f"{thickness:g} thick",
-                "pieces": number,
-                "area_m2": round(number * width * height / 1e6, 4),
-            }
-        )
+    others = [sheet for sheet in sheets if not straight & set(sheet.labels)]
+    wanted = [("for all parts", sheets), ("with bars: for the other parts", others)]
+    for purpose, chosen in wanted if either else [("as drawn", sheets)]:
+        sizes = Counter((*sheet.size, sheet.thickness) for sheet in chosen)
+        for (width, height, thickness), number in sizes.items():
+            rows.append(
+                {
+                    "item": f"to buy: sheets of {width:g} x {height:g} mm, {purpose}",
+                    "section_mm": f"{thickness:g} thick",
+                    "pieces": number,
+                    "area_m2": round(number * width * height / 1e6, 4),
+                }
+            )
     return rows
 
 

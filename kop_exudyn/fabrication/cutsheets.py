@@ -6,7 +6,7 @@ turned).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from ..wording import counted
 from .blanks import Blanks
 from .options import NOTE_ROOM, CutOptions
 from .shapes import NOTES, Polyline, Shape, Template, Text, rectangle
-from .sources import on_sheets, too_large
+from .sources import on_sheets, sources, too_large
 
 _NOTE_HEIGHT = 6.0  # mm
 _SCALE_BAR = 100.0  # mm, to check a print with
@@ -40,7 +40,8 @@ class Sheet:
 
 def cut_sheets(blanks: Blanks, *, force: bool = False, warning: str = "") -> list[Sheet]:
     """All pieces that the kit's neediest designs use, on as many sheets as they take; those of one
-    thickness together. Straight pieces that only bars hold are left out (see `sources`).
+    thickness together. Straight pieces that only bars hold are left out (see `sources`); where
+    either will do, the last sheets hold these alone.
 
     force : leave out, too, what no sheet holds
     warning : stands on every sheet, below its pieces
@@ -48,7 +49,9 @@ def cut_sheets(blanks: Blanks, *, force: bool = False, warning: str = "") -> lis
     Raises InputError where a piece is larger than a sheet; see also `templates`.
     """
     wanted = _wanted(blanks, force)
-    return lay_out(wanted, [t.count for t in wanted], "cut sheet", blanks.options, warning)
+    straight = {label for label, _, _ in blanks.straight} if sources(blanks).either else set()
+    copies = [t.count for t in wanted]
+    return lay_out(wanted, copies, "cut sheet", blanks.options, warning, straight)
 
 
 def template_sheets(blanks: Blanks, *, force: bool = False, warning: str = "") -> list[Sheet]:
@@ -76,10 +79,12 @@ def lay_out(
     title: str,
     options: CutOptions,
     warning: str = "",
+    apart: Collection[str] = (),
 ) -> list[Sheet]:
     """Pieces on sheets, `copies` of each template.
 
     title : what sheets are called, by numbers; warning : stands below their pieces
+    apart : labels of pieces that have sheets of their own, the last ones
 
     Raises InputError where a piece is larger than a sheet.
     """
@@ -93,8 +98,9 @@ def lay_out(
             value=options.sheet,
         )
     found = []
-    for thickness in sorted({template.thickness for template in wanted}, reverse=True):
-        numbers = [k for k, template in enumerate(wanted) if template.thickness == thickness]
+    groups = [(template.label in apart, -template.thickness) for template in wanted]
+    for group in sorted(set(groups)):
+        numbers, thickness = [k for k, own in enumerate(groups) if own == group], -group[1]
         pieces = [wanted[k] for k in numbers for _ in range(copies[k])]
         found += [(thickness, on_it) for on_it in _packed(pieces, width, height, options.apart)]
     return [

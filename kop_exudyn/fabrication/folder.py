@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..checks import check_kind, choices
 from ..errors import InputError
-from ..files.files import file_stem, make_folder, write_text
+from ..files.files import file_stems, make_folder, write_text
 from ..files.tables import write_csv
 from ..io.stocks import stock_rows
 from ..units import Units
@@ -97,8 +97,9 @@ def export_workshop(
         "fasteners": fasteners(blanks),
         "bars": bar_rows(bars),
     }
+    stems = file_stems([pieces.design.name for pieces in parts.designs])
     for pieces in parts.designs:
-        name, stem = pieces.design.name, file_stem(pieces.design.name)
+        name, stem = pieces.design.name, stems[pieces.design.name]
         done.append(write_bill(folder / f"bill_{stem}.csv", parts, [name], overwrite=overwrite))
         path = folder / f"assembly_{stem}.csv"
         done.append(write_assembly_plan(path, parts, name, unit, overwrite=overwrite))
@@ -111,7 +112,7 @@ def export_workshop(
     ]
     done.append(book.save(folder / "workshop.pdf", overwrite=overwrite))
     for drawing in drawings:
-        done += save_assembly_drawing(drawing, folder, overwrite=overwrite)
+        done += save_assembly_drawing(drawing, folder, stems[drawing.name], overwrite=overwrite)
     for stem, found in {
         "cut_sheet": sheets,
         "templates": template_sheets(blanks, force=force, warning=warning),

@@ -96,8 +96,8 @@ def cell_pages(book: Book, blanks: Blanks) -> None:
     scale = fitting_scale(size, room - [12.0, 30.0])
     note = (
         f"Pins {cells.pin:g} mm, along the plates' edges. Plates are seen from outside; ears sit "
-        "on their inner faces. Arms are laid up of two boards (1 with the disc, 2 without); at a "
-        "crossing the discs of two arms lie side by side, locked by two "
+        "on their inner faces. Arms are laid up of two boards, labels up: 2, without a disc, on 1, "
+        "which has one. So at a crossing the discs of two arms lie side by side, locked by two "
         f"pins of {cells.thickness / 4:g} mm."
     )
     page, at, below = None, np.zeros(2), 0.0

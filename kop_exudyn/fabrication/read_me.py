@@ -16,11 +16,11 @@ from .sources import advice
 
 # Beginnings of file names; the first that fits counts.
 _FILES = {
-    r"workshop\.": "all of it to print: the lists, every part with its dimensions, bars, sheets, "
-    "and of every design its steps, drawing and joints. Print at 100 %; pages that are to scale "
-    "have a bar to check that by",
+    r"workshop\.": "all of it to print: the lists, every part with its dimensions, what it is cut "
+    "from, and of every design its steps, drawing and joints. Print at 100 %; pages that are to "
+    "scale have a bar to check that by",
     r"cut_list\.": "one line a part: how many to make, and how to cut it",
-    r"material\.": "what the parts take, and the bars and sheets to buy for them",
+    r"material\.": "what the parts take, and what to buy for them",
     r"fasteners\.": "bolts or pins, as many as the design with most of them needs",
     r"stock\.": "these pieces as a stock, from which other designs can be sought: kop optimize "
     "DESIGNS --stock stock.csv. Change the counts to what is there",
@@ -43,7 +43,7 @@ _COLUMNS = {
     r"force_unit": "the unit of force of the designs",
     r"l1|l2|top|bottom|angle": "of a stock: the part itself, see the columns of that name with a "
     "unit in the cut list",
-    r"slit": "of a stock: by how much shorter either side may be bolted",
+    r"slit": "of a stock: by how much longer than l1 and l2 either side may be bolted",
     r"pieces": "how many to make or to buy: enough for any one of the designs",
     r"in_.*": "how many of them the design of that name needs",
     r"angle_deg": "of a corner: by how much the second strip turns against the first; of a joint: "

@@ -25,7 +25,7 @@ NO_PLATES = (
 )
 EITHER = (
     "Straight pieces may be sawn from bars or cut from sheets: both plans are there, choose one. "
-    "Everything else comes from the sheets."
+    "Whoever chooses bars needs those sheets only that hold no straight pieces: the first ones."
 )
 _ROUND = 10  # mm, that sizes of sheets and bars are rounded up to
 

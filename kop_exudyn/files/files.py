@@ -7,6 +7,7 @@ What a path is, is asked of os.path: pathlib's questions raise OSError for names
 from __future__ import annotations
 
 import gzip
+import itertools
 import os
 import re
 import tempfile
@@ -163,3 +164,17 @@ def reason_of(error: OSError) -> str:
 def file_stem(name: str) -> str:
     """A design's name as part of a file's: letters, digits and a few harmless characters."""
     return re.sub(r"[^\w.-]+", "_", name).strip("._") or "design"
+
+
+def file_stems(names: Sequence[str]) -> dict[str, str]:
+    """Names of designs as parts of files' names, each another one, also where upper and lower case
+    are the same: a number is added to what others have already."""
+    found: dict[str, str] = {}
+    taken: set[str] = set()
+    for name in names:
+        stem = file_stem(name)
+        numbered = (f"{stem}_{k}" for k in itertools.count(2))
+        own = next(s for s in itertools.chain([stem], numbered) if s.casefold() not in taken)
+        taken.add(own.casefold())
+        found[name] = own
+    return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from ..io.checkpoint import Job
 from ..io.run_folder import RunFolder
 from ..search.pool import DesignPool
 from ..search.result import KitResult
-from ..search.run import check_request, described_job, digest
+from ..search.run import check_request, described_job, design_digest
 from ..search.settings import JobSettings
 from ..structures.base import Design
 from ..structures.serving import served_by
@@ -56,14 +56,15 @@ def smallest_and_report(
     resume: bool = False,
     overwrite: bool = False,
     progress: bool = False,
+    verdict: VerdictSettings = VerdictSettings(),
 ) -> tuple[SizedKit, bool]:
     """Find the smallest kit within a deviation; write its report with all kits looked at.
 
     Parameters
     ----------
     designs, limit, first, cost, settings, accepts : see `smallest_kit`
-    out, inputs, resume, overwrite, progress : see `optimize_and_report`, also for the workshop's
-        bounds on parts
+    out, inputs, resume, overwrite, progress, verdict : see `optimize_and_report`, also for the
+        workshop's bounds on parts
 
     Returns the kit and whether it keeps the limit; where none does, the one that deviates least.
     Raises InputError and SimulationFailure as `optimize_and_report`.
@@ -72,7 +73,7 @@ def smallest_and_report(
     settings = within_workshop(designs, settings)
     asked = {"max_deviation": limit, "cost": asdict(cost)}
     with _prepared(
-        designs, first, settings, asked, out, inputs, resume, overwrite, progress
+        designs, first, settings, asked, out, inputs, resume, overwrite, progress, verdict
     ) as run:
         found, kits = smallest_kit(
             designs,
@@ -101,8 +102,7 @@ def smallest_and_report(
             page.section("Other sizes", text)
             _add_table(page, rows, figure)
 
-        asked_of = VerdictSettings(safety=settings.stages.requirements.safety)
-        verdicts = give_verdicts(chosen.result, asked_of, settings.jobs, settings.scheduler)
+        verdicts = give_verdicts(chosen.result, run.verdict, settings.jobs, settings.scheduler)
         write_kit_report(chosen.result, run.folder.path, verdicts, extend)
     return chosen, found is not None
 
@@ -118,6 +118,7 @@ def tradeoff_and_report(
     resume: bool = False,
     overwrite: bool = False,
     progress: bool = False,
+    verdict: VerdictSettings = VerdictSettings(),
 ) -> list[SizedKit]:
     """Find kits of several sizes; write tradeoff.json, tradeoff.csv, a figure and a page, and every
     kit's own report in a folder of its own.
@@ -126,15 +127,24 @@ def tradeoff_and_report(
     ----------
     designs, sizes, settings : see `trade_off`
     cost : shown with every kit
-    out, inputs, resume, overwrite, progress : see `optimize_and_report`, also for the workshop's
-        bounds on parts
+    out, inputs, resume, overwrite, progress, verdict : see `optimize_and_report`, also for the
+        workshop's bounds on parts
 
     Raises InputError and SimulationFailure as `optimize_and_report`.
     """
     designs = served_by(designs, sizes[-1])
     settings = within_workshop(designs, settings)
     with _prepared(
-        designs, sizes[-1], settings, _asked(sizes), out, inputs, resume, overwrite, progress
+        designs,
+        sizes[-1],
+        settings,
+        _asked(sizes),
+        out,
+        inputs,
+        resume,
+        overwrite,
+        progress,
+        verdict,
     ) as run:
         kits = trade_off(
             designs,
@@ -192,7 +202,7 @@ def _job(
 ) -> Job:
     job = {**described_job(designs, parts, None, settings), **asked}
     if not inputs:
-        job["parameters"] = {design.name: digest(design.parameters) for design in designs}
+        job["content"] = {design.name: design_digest(design) for design in designs}
     return Job.of(plain(job), inputs)
 
 
@@ -210,12 +220,14 @@ class _prepared:
         resume: bool,
         overwrite: bool,
         progress: bool,
+        verdict: VerdictSettings,
     ):
         check_request(designs, parts, None, settings)
         job = _job(designs, parts, settings, asked, inputs)
         self.folder = RunFolder.open(out, job, resume=resume, overwrite=overwrite)
         self._bar = progress_bar(progress)
         self._required = settings.stages.requirements
+        self.verdict = replace(verdict, safety=self._required.safety)
         self._given: list[Buildable] = []
 
     def __enter__(self) -> _prepared:
@@ -227,8 +239,7 @@ class _prepared:
 
     def examine(self, pool: DesignPool) -> None:
         """Say what stops the input designs, and so no kit can mend."""
-        asked = VerdictSettings(safety=self._required.safety)
-        self._given = given_verdicts(pool, asked, self._required)
+        self._given = given_verdicts(pool, self.verdict, self._required)
         for line in warning_lines(self._given):
             log.warning("%s", line)
 

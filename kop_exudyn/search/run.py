@@ -53,6 +53,8 @@ from .weights import Weights
 
 log = logging.getLogger(__name__)
 
+_FAR_OFF = 10.0  # times an element: parts that are all longer serve none
+
 
 def optimize_kit(
     designs: Sequence[Design],
@@ -336,6 +338,7 @@ def check_request(
         what = "stock" if isinstance(kit, Stock) else "kit"
         named = {f"the {what}": given, "the designs": units}
         units = common_units(named, f"designs and {what}s")
+        _check_lengths(designs, kit.kit if isinstance(kit, Stock) else kit, what, units)
     constraints, n_q = settings.stages.constraints, parameter_offsets(designs)[-1]
     if constraints is not None and constraints.A.shape[1] != n_q:
         raise InputError(
@@ -352,6 +355,31 @@ def check_request(
             raise InputError(_lacks(missing, designs, kit, units), field="stock")
         return
     cluster(groups, q, dict(parts or {}), bounds=settings.stages.bounds, restarts=1)
+
+
+def _check_lengths(designs: Sequence[Design], kit: Kit, what: str, units: Units | None) -> None:
+    """Raise InputError for parts that are all much longer, or shorter, than any element that they
+    could serve: they are in another unit."""
+    q = stacked_parameters(designs)
+    for kind, parts in kit.parts.items():
+        own = [g.indices for g in stacked_groups(designs) if g.kind == kind and g.indices.size]
+        if part_kind(kind).angular or not own:
+            continue
+        elements = np.concatenate([np.abs(q[indices]).max(axis=1) for indices in own])
+        lengths = np.abs(parts).max(axis=1)
+        if not elements.max() or (
+            lengths.min() <= _FAR_OFF * elements.max()
+            and lengths.max() >= elements.min() / _FAR_OFF
+        ):
+            continue
+        unit = "" if units is None else f" {units.length}"
+        raise InputError(
+            f"all {kind} parts are {np.median(lengths) / np.median(elements):.3g} times as long as "
+            f"the designs' elements, of about {np.median(elements):.3g}{unit}: are they in another "
+            f"unit? A {what}'s file says in which its lengths are",
+            field=what,
+            value=f"{np.median(lengths):.6g}{unit}",
+        )
 
 
 def described_job(

@@ -349,7 +349,8 @@ class TestAClassFromOutside:
         nets.net_classes()
         for registry in (base.CLASSES, nets.NETS):
             monkeypatch.setattr(registry, "items", dict(registry.items))
-        base.register_class("toy")(lambda data, source: SimpleNamespace(middle=np.zeros(3)))
+        toy = SimpleNamespace(middle=np.zeros(3), doubts=[])
+        base.register_class("toy")(lambda data, source: toy)
         nets.register_net(
             "toy",
             nets.NetClass(

@@ -46,9 +46,9 @@ def test_meshes_and_graphs(design, result):
     pytest.importorskip("compas")
     graph = kop.to_compas(result)["graph"]
     assert graph.number_of_edges() == len(design.scene("deployed").chains)
-    with pytest.raises(InputError, match="state = 'flat': no such state .known: deployed, rest"):
+    with pytest.raises(InputError, match="state = 'flat': unknown .known: deployed, rest"):
         kop.to_meshio(result, "flat")
-    with pytest.raises(InputError, match="design = 'other': is another design"):
+    with pytest.raises(InputError, match="design = 'other': unknown .known: small sinh"):
         kop.to_meshio(result, design="other")
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import shapely
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from support.umbrellas import HARDWARE
 
 from kop_exudyn.drawing.labels import Label, place
 from kop_exudyn.errors import InputError
@@ -121,6 +122,7 @@ def lattice(across, down, wanted=lambda i, j: True):
     return design_from_dict(
         {
             "class": "umbrella",
+            **HARDWARE,
             "name": "lattice",
             "lengths": lengths,
             "base": {"vertices": points, "faces": faces},

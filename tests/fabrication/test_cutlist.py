@@ -6,6 +6,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from support.umbrellas import HARDWARE
 
 from kop_exudyn.errors import InputError
 from kop_exudyn.fabrication.assembly import assembly_plan, write_assembly_plan
@@ -126,6 +127,7 @@ def test_umbrella_cells_are_sets_of_bars():
     design = design_from_dict(
         {
             "class": "umbrella",
+            **HARDWARE,
             "name": "small",
             "lengths": [[32, 33], [34, 35], [34, 35], [34, 35]],
             "base": {

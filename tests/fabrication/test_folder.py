@@ -11,6 +11,7 @@ import kop_exudyn as kop
 from kop_exudyn.errors import InputError
 from kop_exudyn.fabrication.assembly import joint_places
 from kop_exudyn.fabrication.blanks import Blanks
+from kop_exudyn.fabrication.cutsheets import cut_sheets
 from kop_exudyn.fabrication.folder import export_workshop
 from kop_exudyn.fabrication.options import CutOptions
 from kop_exudyn.fabrication.pieces import parts_list
@@ -76,7 +77,13 @@ def test_bars_and_sheets_to_buy_are_those_that_are_planned(parts, folder):
         row = rows[f"to buy: bars of {length:g} mm, or sheets"]
         assert int(row["pieces"]) == sum(bar.length == length for bar in bars)
     sheets = len(list(folder.glob("cut_sheet_*.svg")))
-    assert int(rows["to buy: sheets of 1000 x 600 mm, for all parts"]["pieces"]) == sheets
+    cut = cut_sheets(Blanks(parts, "m"))
+    size = "to buy: sheets of 1000 x 600 mm"
+    assert int(rows[f"{size}, for all parts"]["pieces"]) == sheets
+    # who takes bars needs the first sheets only, on which there are no strips
+    alone = [not {s.label for s in Blanks(parts, "m").strips} & set(sheet.labels) for sheet in cut]
+    assert alone == sorted(alone, reverse=True) and 0 < sum(alone) < len(alone) == sheets
+    assert int(rows[f"{size}, with bars: for the other parts"]["pieces"]) == sum(alone)
     pages = pypdf.PdfReader(folder / "workshop.pdf").pages
     printed = " ".join(page.extract_text().replace("\n", " ") for page in pages)
     told = " ".join((folder / "READ_ME.txt").read_text(encoding="utf-8").split())

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from kop_exudyn.fabrication.blanks import Blanks, least_side
+from kop_exudyn.fabrication.cutlist import cut_list
 from kop_exudyn.fabrication.limits import part_bounds, usual_options
 from kop_exudyn.fabrication.pieces import parts_list
 from kop_exudyn.fabrication.shapes import Hole, Polyline
@@ -80,3 +81,16 @@ def test_a_side_has_room_for_holes_beside_the_longest_slit(built):
     shortest = plain._sides.min()
     for slit, possible in ((shortest - least - 0.1, True), (shortest - least + 0.5, False)):
         assert (blanks_of(built, slit).problems == ()) is possible
+
+
+def test_lengths_in_the_cut_list_are_those_that_holes_go_by(built):
+    """l1 and l2 were the shortest that a slit part realises, and the text said the longest."""
+    blanks = blanks_of(built, 6.0)
+    rows = {row["part"]: row for row in cut_list(blanks)}
+    for strip in blanks.strips:
+        row = rows[strip.label]
+        kit = 1e3 * blanks.parts.kit["slit"][int(strip.label[1:]) - 1]
+        assert row["l1_mm"] == pytest.approx(kit[0] + kit[2], abs=1e-3)
+        assert row["l1_mm"] - row["setback_mm"] == pytest.approx(row["hole_from_end_mm"], abs=2e-3)
+        both = row["l1_mm"] + row["l2_mm"] - 2 * row["setback_mm"]
+        assert row["cut_length_mm"] == pytest.approx(both, abs=3e-3)

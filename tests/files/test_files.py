@@ -9,6 +9,7 @@ import pytest
 from kop_exudyn.errors import InputError
 from kop_exudyn.files.files import (
     check_output_file,
+    file_stems,
     make_folder,
     read_bytes,
     write_bytes,
@@ -108,3 +109,12 @@ def test_make_folder_leaves_nothing_in_it(tmp_path):
 def test_folder_that_nobody_may_write_to():
     with pytest.raises(InputError, match="can't be written"):
         make_folder("/proc/self/out")
+
+
+def test_every_name_has_a_file_of_its_own():
+    """Designs whose names differ in other characters only wrote over each other's files."""
+    names = ["a b", "a_b", "A_B", "a+b", "a_b_2", "ü", "?", "!"]
+    stems = file_stems(names)
+    assert list(stems) == names and stems["a b"] == "a_b" and stems["ü"] == "ü"
+    assert len({stem.casefold() for stem in stems.values()}) == len(names)
+    assert file_stems(["one", "two"]) == {"one": "one", "two": "two"}

@@ -163,7 +163,7 @@ DESIGNS = 'designs = ["designs"]\n'
             r"settings.sead: unknown field \(did you mean 'seed'\?\)",
         ),
         (DESIGNS + "[settings]\nseed = true", "settings.seed = True: must be an integer"),
-        (DESIGNS + "[settings]\ntight = nan", "settings.tight = nan: is out of range"),
+        (DESIGNS + "[settings]\ntight = nan", "settings.tight = nan: must be finite"),
         (
             DESIGNS + '[settings]\nhessian = "none"',
             'settings.hessian = \'none\': must be one of "exact", "bfgs"',

@@ -9,6 +9,7 @@ import pytest
 from support.settings import QUICK
 from support.zigzags import zigzags
 
+from kop_exudyn.analysis.verdict import VerdictSettings
 from kop_exudyn.errors import InputError
 from kop_exudyn.fabrication.limits import part_bounds
 from kop_exudyn.io.checkpoint import CheckpointStore
@@ -76,8 +77,9 @@ def test_the_smallest_kit_and_its_report(tmp_path, monkeypatch):
     monkeypatch.setattr(
         sizes_run, "given_verdicts", lambda *asked: looked.append(1) or given(*asked)
     )
+    asked = VerdictSettings(length=3e-4, angle=2e-4, samples=3)
     chosen, kept = smallest_and_report(
-        zigzags(), 50.0, {"linear": 2, "angular": 1}, out=tmp_path, settings=SETTINGS
+        zigzags(), 50.0, {"linear": 2, "angular": 1}, out=tmp_path, settings=SETTINGS, verdict=asked
     )
     assert kept and chosen.sizes == {"linear": 1, "angular": 1}
     data = load_result(tmp_path / "result.json")
@@ -85,7 +87,10 @@ def test_the_smallest_kit_and_its_report(tmp_path, monkeypatch):
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "The smallest kit found that keeps every design within 50\xa0%" in page
     assert len(shown(tmp_path)) == 2 and len(looked) == 1  # at the inputs, of both searches
-    assert all(design["input"]["buildable"]["verdict"] for design in data["designs"])
+    for design in data["designs"]:
+        assert design["input"]["buildable"]["verdict"]
+        tried = design["buildable"]["tolerance"]  # what cut lists go by; the usual errors, once
+        assert (tried["length"], tried["angle"], tried["samples"]) == (3e-4, 2e-4, 3)
 
 
 @pytest.mark.parametrize("run", ["smallest", "tradeoff"])

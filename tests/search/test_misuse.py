@@ -11,6 +11,7 @@ from support.settings import ONE_STEP
 
 import kop_exudyn as kop
 from kop_exudyn.io.designs import load_design
+from kop_exudyn.kit.stock import Stock
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.settings import JobSettings
 from kop_exudyn.search.terms import base
@@ -64,6 +65,19 @@ def _content(design):
 def test_misuses_are_named_before_anything_is_simulated(designs, change, message):
     with pytest.raises(kop.InputError, match=message):
         kop.optimize_kit(**{"designs": designs, "parts": PARTS, "settings": SETTINGS} | change)
+
+
+@pytest.mark.parametrize("as_stock", [False, True])
+def test_parts_in_another_unit_are_refused(designs, as_stock):
+    """A stock in millimetres, for designs in metres, ended in a simulation that failed."""
+    q = designs[0].parameters
+    sides = q[next(g.indices for g in designs[0].groups if g.kind == "linear")][:3, :2]
+    for factor in (1000.0, 1e-3):
+        kit = kop.Kit({"linear": factor * np.abs(sides[:, [0, -1]]), "angular": [0.1, 0.3]})
+        counts = {kind: np.full(m, 500) for kind, m in kit.sizes.items()}
+        given = Stock(kit, counts) if as_stock else kit
+        with pytest.raises(kop.InputError, match="times as long as the designs' elements"):
+            kop.optimize_kit(designs, kit=given, settings=SETTINGS)
 
 
 def test_one_name_and_numbers_that_are_none(designs):

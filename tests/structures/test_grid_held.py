@@ -59,10 +59,10 @@ def test_sensitivities_of_a_held_grid():
 @pytest.mark.parametrize(
     "held, message",
     [
-        ("edge", 'held = .edge.: expected numbers of joints, "corners" or "boundary"'),
+        ("edge", 'held = .edge.: must be "corners", "boundary" or a list'),
         ([0, 1, 25], "held = 25: names a joint that doesn't exist .joints 0 to 24"),
-        ([0, 4], "held = .0, 4.: joints on one line"),
-        ([-1, 4, 20], "held = -1: names a joint"),
+        ([0, 4], "held = .0, 4.: must have at least 3 entries"),
+        ([-1, 4, 20], "held.0. = -1: must be at least 0"),
     ],
 )
 def test_joints_that_cant_be_held(held, message):

@@ -222,8 +222,8 @@ def test_file_meets_its_schema():
         (
             ("target",),
             {
-                "vertices": [[0, 0, 0]],
-                "faces": [[0, 0, 0]],
+                "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]],
+                "faces": [[0, 1, 2]],
                 "crossings": [[0, 0, 0]],
                 "plates": [[0, 0, 0]] * 6,
             },

@@ -26,6 +26,16 @@ PLATES = Plates()
 EDGE = 30 + np.sqrt(3) * PLATES.thickness
 
 
+# what files have to say besides their shape, for designs made by hand
+HARDWARE = {
+    "plates": {"arm_position": 10.0, "thickness": 3.0, "width": 5.0, "spacing": 15.0},
+    "materials": {
+        "arms": {"young": 1400.0, "poisson": 0.35},
+        "plates": {"young": 14000.0, "poisson": 0.35},
+    },
+}
+
+
 def hexagon(rings: int) -> BaseMesh:
     return BaseMesh(*hexagon_patch(rings, EDGE))
 
