@@ -42,7 +42,8 @@ def to_pandas(result: Result) -> dict[str, Any]:
         tables = result_tables(result)
     else:
         rods = [row for state in states_of_simulation(result) for row in rod_rows(state)]
-        places = result.joints + result.design.file_origin
+        design = result.design  # of whose joints some have no place on the target, as plates' have
+        places = result.deployed.state.positions[design.joints] + design.origin
         joints = [
             {"joint": k, "x": x, "y": y, "z": z, "distance": distance}
             for k, ((x, y, z), distance) in enumerate(zip(places, result.fit.distances), 1)

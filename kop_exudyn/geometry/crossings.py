@@ -260,7 +260,7 @@ def _polish(
         )
         ds, dt = _newton_step(x - y, p, q)
         longest = np.maximum(np.abs(ds), np.abs(dt))
-        scale = np.minimum(1.0, cap[going] / np.maximum(longest, 1e-300))
+        scale = cap[going] / np.maximum(longest, cap[going])
         s[going] += scale * ds
         t[going] += scale * dt
         going = going[longest > still[going]]

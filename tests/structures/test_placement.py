@@ -17,6 +17,7 @@ from support.settings import FEW_ERRORS
 from kop_exudyn.analysis.simulation import simulate
 from kop_exudyn.equilibrium.newton import refine, solve
 from kop_exudyn.equilibrium.system import System
+from kop_exudyn.exchange.objects import to_meshio, to_pandas
 from kop_exudyn.exchange.polygons import write_mesh_obj
 from kop_exudyn.exchange.states import states_of_simulation
 from kop_exudyn.geometry.centring import TooFarError
@@ -230,6 +231,30 @@ def turned_grid(folder, turn, shift):
         "held": "corners",
     }
     return design_from_dict(data, str(folder / "turned.json"))
+
+
+@pytest.mark.parametrize("name", ["small/01_sinh.json", "umbrellas/dome.json"])
+@pytest.mark.parametrize("sizes", [0.0, 5.0, 40.0])
+@pytest.mark.parametrize("origin", [None, (7.0, -3.0, 11.0)])
+def test_every_output_has_the_same_joints(repository, name, sizes, origin):
+    """The design's place was added twice to those of JSON and of tables."""
+    data, _, size = placed(json.loads((repository / "models" / name).read_text()), sizes, 3)
+    more = {} if origin is None else {"origin": (size * np.array(origin)).tolist()}
+    design = design_from_dict(data | more)
+    assert np.any(design.middle) == (sizes > 2)
+    result = simulate(design, warn=False)
+    shift = np.zeros(3) if origin is None else size * np.array(origin)
+    wanted = result.joints + shift
+    np.testing.assert_allclose(result.to_dict()["joints"], wanted, atol=1e-9 * size)
+    table = to_pandas(result)["joints"]
+    fitted = result.deployed.state.positions[design.joints] + design.middle + shift
+    np.testing.assert_allclose(table[["x", "y", "z"]].to_numpy(), fitted, atol=1e-9 * size)
+    np.testing.assert_allclose(table["distance"], result.fit.distances)
+    away = np.linalg.norm(fitted[:, None] - wanted[None], axis=2).min(axis=1)
+    assert away.max() < 1e-9 * size  # they are among all joints
+    points = to_meshio(result).points  # as exported: placed onto the target
+    far = np.linalg.norm(points[:, None] - wanted[None], axis=2).min(axis=0)
+    assert far.max() < 0.05 * size
 
 
 def test_simulations_and_files_have_the_users_coordinates(repository):
