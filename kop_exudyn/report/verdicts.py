@@ -113,14 +113,21 @@ def verdict_lines(verdicts: Sequence[Buildable], units: Units | None = None) -> 
         first = f"{_listed(can)} can be built from this kit, {names} can't."
     else:
         first = f"{names} can't be built from this kit."
-    return first, " ".join(stopped(verdict) for verdict in not_)
+    alike: dict[str, list[str]] = {}
+    for verdict in not_:
+        alike.setdefault(_stops(verdict), []).append(verdict.design)
+    return first, " ".join(f"{', '.join(names)}: {text}." for text, names in alike.items())
 
 
 def stopped(verdict: Buildable) -> str:
     """What stops a design, and what would help."""
+    return f"{verdict.design}: {_stops(verdict)}."
+
+
+def _stops(verdict: Buildable) -> str:
     some = ". Also ".join(map(str, verdict.stops[:_MOST_STOPS]))
     more = len(verdict.stops) - _MOST_STOPS
-    return f"{verdict.design}: {some}{f'. And {more} more' if more > 0 else ''}."
+    return f"{some}{f'. And {more} more' if more > 0 else ''}"
 
 
 def verdict_rows(

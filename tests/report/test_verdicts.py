@@ -143,6 +143,8 @@ class TestWords:
         first, second = verdict_lines(verdicts)
         assert first == "a and c can be built from this kit, b and d can't."
         assert second == "b: reason 0. Also reason 1; help. And 1 more. d: reason 1; help."
+        twice = [*verdicts, Buildable("e", stops=(stops[1],))]  # said once of both
+        assert verdict_lines(twice)[1].endswith("And 1 more. d, e: reason 1; help.")
 
     def test_all_can(self):
         assert verdict_lines([Buildable("a"), Buildable("b")])[0].startswith("Both designs can")
