@@ -185,16 +185,19 @@ class Way:
         solve: Callable[..., Equilibrium],
     ) -> Equilibrium | None:
         """The state on the side of the shape to lift to, where a station's state has come out as
-        that shape's mirror image and there is one; else None.
+        that shape's mirror image, and its own mirror image is one; else None.
 
-        A net may bend in another way first, and turn into one of the two where that one ends: which
-        of them, the builder's hands decide.
+        A net may bend in another way first, and turn into one of the two where that one ends. A
+        flat assembly is its own mirror image: lifted to the other side first, it would have come
+        out here. Builders find out by trying.
         """
         if station.lifted is None or not self._mirrored(station.lifted.state, found.state):
             return None
         options = NewtonOptions(side=station.side(system))
         other = solve(system, q, station.lifted, station.opening, options)
-        return None if self._mirrored(station.lifted.state, other.state) else other
+        x, y = (state.positions[self.joints] for state in (other.state, found.state))
+        same = _apart(x, y * (1.0, 1.0, -1.0)).max() <= SAME_STATE * self.size
+        return other if same else None
 
     def _mirrored(self, wanted: State, found: State) -> bool:
         """Whether the joints lie clearly nearer to a shape's mirror image than to the shape."""
