@@ -95,11 +95,12 @@ def _objects(data: Any, layer: str, outermost: bool = True) -> Iterator[tuple[st
 def _check_siblings(items: list[Any]) -> None:
     """Raise InputError, naming the item, for what is no curve in a list of others that are: it
     would be missing from the net."""
-    curves = [isinstance(item, list) and _is_points(item) for item in items]
+    curves = [_holds_points(item) for item in items]
     if not any(curves):
         return
     for k, item in enumerate(items):
-        if curves[k] or isinstance(item, Mapping) and isinstance(item.get("dtype"), str):
+        layer = isinstance(item, list) and item and all(map(_holds_points, item))
+        if curves[k] or layer or isinstance(item, Mapping) and isinstance(item.get("dtype"), str):
             continue
         wrong, value = f"[{k}]", item
         if isinstance(item, list) and len(item) > 1:
@@ -120,6 +121,10 @@ def _bare(found: Sequence[tuple[str, Any, str]]) -> Iterator[list[list[float]]]:
         points = data.get("points") if kind == "Polyline" and isinstance(data, Mapping) else None
         if isinstance(points, list) and points and isinstance(points[0], list):
             yield points
+
+
+def _holds_points(item: Any) -> bool:
+    return isinstance(item, list) and _is_points(item)
 
 
 def _is_points(data: list[Any]) -> bool:

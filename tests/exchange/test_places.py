@@ -115,4 +115,6 @@ class TestListsOfPoints:
 
         with pytest.raises(InputError, match=named + ".*is no curve"):
             json_drawing(json.dumps([*self.curves, wrong]).encode(), ())
-        assert len(json_drawing(json.dumps(self.curves).encode(), ()).curves) == 8
+        nested = [self.curves, [*self.curves[:3], self.curves[3:5]]]  # lists of lists are layers
+        for whole, number in ((self.curves, 8), (nested, 13)):
+            assert len(json_drawing(json.dumps(whole).encode(), ()).curves) == number
