@@ -41,7 +41,7 @@ class Sheet:
 def cut_sheets(blanks: Blanks, *, force: bool = False, warning: str = "") -> list[Sheet]:
     """All pieces that the kit's neediest designs use, on as many sheets as they take; those of one
     thickness together. Straight pieces that only bars hold are left out (see `sources`); where
-    either will do, the last sheets hold these alone.
+    either will do, the first sheets hold these alone.
 
     force : leave out, too, what no sheet holds
     warning : stands on every sheet, below its pieces
@@ -84,7 +84,7 @@ def lay_out(
     """Pieces on sheets, `copies` of each template.
 
     title : what sheets are called, by numbers; warning : stands below their pieces
-    apart : labels of pieces that have sheets of their own, the last ones
+    apart : labels of pieces that have sheets of their own, the first ones
 
     Raises InputError where a piece is larger than a sheet.
     """
@@ -98,7 +98,7 @@ def lay_out(
             value=options.sheet,
         )
     found = []
-    groups = [(template.label in apart, -template.thickness) for template in wanted]
+    groups = [(template.label not in apart, -template.thickness) for template in wanted]
     for group in sorted(set(groups)):
         numbers, thickness = [k for k, own in enumerate(groups) if own == group], -group[1]
         pieces = [wanted[k] for k in numbers for _ in range(copies[k])]

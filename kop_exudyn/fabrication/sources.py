@@ -25,7 +25,7 @@ NO_PLATES = (
 )
 EITHER = (
     "Straight pieces may be sawn from bars or cut from sheets: both plans are there, choose one. "
-    "Whoever chooses bars needs those sheets only that hold no straight pieces: the first ones."
+    "Whoever chooses bars needs those sheets only that hold no straight pieces: the last ones."
 )
 _ROUND = 10  # mm, that sizes of sheets and bars are rounded up to
 

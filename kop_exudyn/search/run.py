@@ -53,7 +53,7 @@ from .weights import Weights
 
 log = logging.getLogger(__name__)
 
-_FAR_OFF = 10.0  # times an element: parts that are all longer serve none
+_FAR_OFF = 30.0  # times an element: parts that are all longer are in another unit
 
 
 def optimize_kit(

@@ -80,9 +80,9 @@ def test_bars_and_sheets_to_buy_are_those_that_are_planned(parts, folder):
     cut = cut_sheets(Blanks(parts, "m"))
     size = "to buy: sheets of 1000 x 600 mm"
     assert int(rows[f"{size}, for all parts"]["pieces"]) == sheets
-    # who takes bars needs the first sheets only, on which there are no strips
+    # who takes bars needs the last sheets only, on which there are no strips
     alone = [not {s.label for s in Blanks(parts, "m").strips} & set(sheet.labels) for sheet in cut]
-    assert alone == sorted(alone, reverse=True) and 0 < sum(alone) < len(alone) == sheets
+    assert alone == sorted(alone) and 0 < sum(alone) < len(alone) == sheets
     assert int(rows[f"{size}, with bars: for the other parts"]["pieces"]) == sum(alone)
     pages = pypdf.PdfReader(folder / "workshop.pdf").pages
     printed = " ".join(page.extract_text().replace("\n", " ") for page in pages)
