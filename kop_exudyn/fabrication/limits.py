@@ -15,11 +15,12 @@ from ..structures.base import Design
 from ..structures.strength import by_section
 from ..units import common_units
 from .blanks import Blanks, least_side
-from .options import CutOptions, millimetres
+from .options import CutOptions, millimetres, tenths
 from .pieces import parts_list_of
 
 _SHARPER = 1.5  # times the sharpest corner of the inputs: a kit's corners may have to make up
 _SHARPEST = 2.5  # rad
+_MANY = 0.1  # of the elements: what is said of so many before a search
 
 
 def usual_options(designs: Sequence[Design]) -> CutOptions:
@@ -77,6 +78,35 @@ def part_bounds(designs: Sequence[Design], options: CutOptions | None = None) ->
             lower = np.full(kind.n_parameters, -np.inf)
             lower[:2] = shortest
             found[name] = (lower, np.inf)
+    return found
+
+
+def short_sides(designs: Sequence[Design], bounds: Bounds) -> list[str]:
+    """What to know of designs many of whose elements are shorter than any part can be, in words.
+
+    bounds : of their parts, see `part_bounds`
+    """
+    units = common_units({design.name: design.units for design in designs})
+    found = []
+    for name, (lower, _) in bounds.items():
+        if part_kind(name).angular or not np.isfinite(np.atleast_1d(lower)[:2]).all():
+            continue
+        least = float(np.max(lower))
+        sides = [
+            design.parameters[group.indices].min(axis=1)
+            for design in designs
+            for group in design.groups
+            if group.kind == name and group.indices.shape[1] > 1
+        ]
+        short = float(np.mean(np.concatenate(sides) < least)) if sides else 0.0
+        if units is not None and short > _MANY:
+            length = tenths(least * millimetres(units.length))
+            found.append(
+                f"{100 * short:.0f} % of the {name} elements have a side shorter than {length} mm, "
+                "which a part needs for its holes: parts are longer, whatever their number, at the "
+                "cost of shape and stress. Narrower rods, smaller holes, or designs with longer "
+                "sides would help"
+            )
     return found
 
 

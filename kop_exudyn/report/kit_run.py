@@ -13,7 +13,7 @@ from tqdm import tqdm
 from tqdm.contrib.logging import logging_redirect_tqdm
 
 from ..analysis.verdict import Buildable, VerdictSettings
-from ..fabrication.limits import part_bounds
+from ..fabrication.limits import part_bounds, short_sides
 from ..io.checkpoint import Job
 from ..io.run_folder import RunFolder
 from ..kit.parts import Kit
@@ -79,6 +79,7 @@ def optimize_and_report(
     designs = served_by(designs, kinds_of(parts, kit))
     if kit is None:
         settings = within_workshop(designs, settings)
+        tell_short_sides(designs, settings)
     check_request(designs, parts, kit, settings)
     job = described_job(designs, parts, kit, settings)
     if not inputs:
@@ -121,6 +122,12 @@ def within_workshop(designs: Sequence[Design], settings: JobSettings) -> JobSett
     kinds that they bound in no other way."""
     bounds = {**part_bounds(designs), **(settings.stages.bounds or {})}
     return replace(settings, stages=replace(settings.stages, bounds=bounds or None))
+
+
+def tell_short_sides(designs: Sequence[Design], settings: JobSettings) -> None:
+    """Warn of designs that no part of these settings suits, see `short_sides`."""
+    for text in short_sides(designs, settings.stages.bounds or {}):
+        log.warning("%s", text)
 
 
 @contextmanager

@@ -27,7 +27,7 @@ from ..structures.serving import served_by
 from ..wording import counted_parts
 from .environment import environment
 from .kit_report import write_kit_report
-from .kit_run import progress_bar, within_workshop
+from .kit_run import progress_bar, tell_short_sides, within_workshop
 from .page import Page
 from .tradeoff_drawing import draw_tradeoff
 from .verdicts import give_verdicts, given_verdicts, warning_lines
@@ -71,6 +71,7 @@ def smallest_and_report(
     """
     designs = served_by(designs, first)
     settings = within_workshop(designs, settings)
+    tell_short_sides(designs, settings)
     asked = {"max_deviation": limit, "cost": asdict(cost)}
     with _prepared(
         designs, first, settings, asked, out, inputs, resume, overwrite, progress, verdict
@@ -134,6 +135,7 @@ def tradeoff_and_report(
     """
     designs = served_by(designs, sizes[-1])
     settings = within_workshop(designs, settings)
+    tell_short_sides(designs, settings)
     with _prepared(
         designs,
         sizes[-1],

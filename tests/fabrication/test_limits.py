@@ -11,9 +11,15 @@ import pytest
 
 from kop_exudyn.errors import SimulationFailure
 from kop_exudyn.fabrication.blanks import Blanks, least_side
-from kop_exudyn.fabrication.limits import cutting_problems, part_bounds, usual_options
+from kop_exudyn.fabrication.limits import (
+    cutting_problems,
+    part_bounds,
+    short_sides,
+    usual_options,
+)
 from kop_exudyn.fabrication.options import CutOptions
 from kop_exudyn.fabrication.pieces import parts_list
+from kop_exudyn.io.datasets import load_designs
 from kop_exudyn.kit.cluster import cluster
 from kop_exudyn.kit.parts import Kit
 from kop_exudyn.search.objective import reference_of
@@ -93,3 +99,22 @@ def test_problems_belong_to_the_designs_that_use_the_part(data, design):
     assert [bool(one) for one in problems] == [True, False]
     unknown = design_from_dict({key: value for key, value in data.items() if key != "units"})
     assert cutting_problems(KitResult([unknown], [], {"assigned": Stage()})) == [None]
+
+
+def test_elements_that_no_part_can_be_as_short_as_are_counted(repository):
+    """More parts don't help these: said before the search."""
+    grids = load_designs(repository / "models" / "grids")
+    bounds = part_bounds(grids)
+    (text,) = short_sides(grids, bounds)
+    least = bounds["linear"][0][0]
+    sides = [
+        design.parameters[group.indices].min(axis=1)
+        for design in grids
+        for group in design.groups
+        if group.kind == "linear" and group.indices.shape[1] == 2
+    ]
+    share = np.mean(np.concatenate(sides) < least)
+    assert text.startswith(f"{100 * share:.0f} % of the linear elements have a side shorter than")
+    assert f"{1000 * least:.1f} mm" in text
+    shells = load_designs(repository / "models" / "conformals", 3)
+    assert short_sides(shells, part_bounds(shells)) == [] == short_sides(grids, {})
