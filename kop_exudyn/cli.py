@@ -21,6 +21,7 @@ from .commands import NAMES
 from .commands.colour import RED, LogFormatter, coloured
 from .commands.help_text import HelpFormatter
 from .errors import InputError, OccupiedError, SimulationFailure, did_you_mean
+from .files.files import reason_of
 from .provenance import __version__
 
 # Imports make many objects that stay. To look through them for garbage after every 700 new ones, as
@@ -134,6 +135,8 @@ def _with_their_options(argv: Sequence[str]) -> list[str]:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run ``kop`` with these arguments (default: those of the process); returns the exit status."""
     given = sys.argv[1:] if argv is None else argv
+    if sys.stdout is None:  # closed by who called
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     args, unknown = make_parser().parse_known_args(_with_their_options(given))
     if unknown:
         args.command.refuse(unknown)
@@ -161,6 +164,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has had enough, as in `kop ... | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return OK
+    except OSError as error:
+        if error.filename is not None:  # files' errors name them
+            raise
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return _complain(f"standard output can't be written: {reason_of(error)}", BAD_INPUT)
 
 
 def make_parser() -> argparse.ArgumentParser:

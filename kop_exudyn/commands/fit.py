@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .output import add_json, deviation_text, report
+from .output import add_json, deviation_text, report, shows_progress
 from .values import positive
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     check_output_file(args.out, overwrite=args.overwrite)
     check_ending(args.out, JSON_ENDINGS, "--out")
     data = own_content(args.design)
-    with progress_bar(not args.quiet) as bar:
+    with progress_bar(shows_progress(args)) as bar:
         bar.set_description_str(data["name"])
 
         def observe(step: Any) -> None:

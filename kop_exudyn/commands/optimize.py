@@ -150,10 +150,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--without",
+        action="append",
+        default=[],
         choices=("opening", "stress", "tolerance", "loads", "all"),
         help="don't require that designs open by themselves, that stress keeps below the elastic "
         "limit, that errors of the workshop make nothing snap, that loads are carried, or "
-        "anything: to see what that costs",
+        "anything: to see what that costs; may be given several times",
     )
     parser.add_argument(
         "--samples",
@@ -193,6 +195,12 @@ def run(args: argparse.Namespace) -> int:
         )
     if args.together and args.stock is None:
         raise InputError("says how a stock is used: give it with --stock", field="--together")
+    if args.published and (args.kit or args.stock or args.max_deviation is not None):
+        raise InputError(
+            "finds a kit of as many parts as --parts says: give it without --kit, --stock and "
+            "--max-deviation",
+            field="--published",
+        )
     kit: Kit | Stock | None = None
     if args.kit is not None:
         kit = load_kit(args.kit)
@@ -353,9 +361,9 @@ def _required(args: argparse.Namespace, known: Requirements) -> Requirements:
 
     changes: dict[str, Any] = {}
     for name in ("opening", "stress", "loads"):
-        if args.without in (name, "all"):
+        if {name, "all"} & set(args.without):
             changes[name] = False
-    if args.without in ("tolerance", "all"):
+    if {"tolerance", "all"} & set(args.without):
         changes["samples"] = 0
     if args.safety is not None:
         changes["safety"] = args.safety

@@ -30,14 +30,16 @@ def part_ranges(text: str) -> dict[str, list[int]]:
 
 
 def kit_cost(text: str) -> dict[str, float]:
-    """``part=1,piece=0.02`` as {"part": 1.0, "piece": 0.02}."""
+    """``part=1,piece=0.02`` as {"part": 1.0, "piece": 0.02}; what isn't named costs nothing."""
     found = term_weights(text)
     for name, value in found.items():
         if name not in ("part", "piece", "cut") or value < 0:
             raise argparse.ArgumentTypeError(
                 f"expected part=W,piece=W,cut=W, not negative, got '{name}={value:g}'"
             )
-    return found
+    if not any(found.values()):
+        raise argparse.ArgumentTypeError("expected a weight above 0: all kits would cost the same")
+    return {"part": 0.0, **found}  # the default is of the option, not of each weight
 
 
 def term_weights(text: str) -> dict[str, float]:

@@ -32,6 +32,8 @@ from .results import load_result, load_states
 _LAST = "assigned"
 Outcome = Evaluation | SimulationFailure
 
+_JUDGED = ("equivalent_stress", "utilisation")  # of every state
+_SAME_FIGURE = 1e-3  # of a figure: what is the same when it is found again
 _SAME_PLACE = 1e-6  # of the size: how near a saved state is to the equilibrium found from it
 
 
@@ -112,6 +114,7 @@ def load_run(folder: str | Path, designs: Sequence[Design]) -> KitResult:
                 data.get("status", {}).get(stage, ""),
                 _jumps(data, stage),
             )
+    _check_stiffness(result, data)
     if _LAST not in result.stages:
         raise InputError(
             "lacks the states of the designs built from the kit",
@@ -161,6 +164,38 @@ def _check_kit(
                 source=path.with_name("states.npz"),
                 field=f"{design.name}/{_LAST}",
             )
+
+
+def _check_stiffness(result: KitResult, data: Mapping[str, Any]) -> None:
+    """Raise InputError for designs whose material has been changed since the run: with another
+    modulus the states are the same, with another limit the whole result is."""
+    if _LAST not in result.stages:
+        return
+    for number, (design, entry) in enumerate(zip(result.designs, data["designs"])):
+        saved, found = entry.get(_LAST, {}), result.summary(_LAST, number)
+        if "failed" in saved or "failed" in found:
+            continue
+        energies = (saved.get("elastic_energy"), found["elastic_energy"])
+        pairs = {"elastic_energy": (*energies, result.references[number].energy)}
+        for name in _JUDGED if saved.get("strength") else ():
+            least = max((s[name] or 0.0 for s in found["strength"].values()), default=0.0)
+            for role, strength in found["strength"].items():
+                was = saved["strength"].get(role, {}).get(name)
+                pairs[f"{role} {name}"] = (was, strength[name], least)
+        for name, (was, now, size) in pairs.items():
+            if was is None and now is None:
+                continue
+            if was is None or now is None or abs(now - was) > _SAME_FIGURE * max(now, was, size):
+                raise InputError(
+                    f"its material or section has been changed since the run ({name}: "
+                    f"{_told(was)} then, {_told(now)} now): kop optimize judges it anew",
+                    source=design.source or design.name,
+                    field=_LAST,
+                )
+
+
+def _told(value: float | None) -> str:
+    return "unknown" if value is None else f"{value:.4g}"
 
 
 def _all(outcomes: Sequence[Outcome | None]) -> list[Outcome] | None:

@@ -62,6 +62,15 @@ def test_options_arrive(asked, design_file, tmp_path, capsys):
     assert capsys.readouterr().out == f"{out / 'index.html'}\n"
 
 
+def test_several_requirements_are_left_out(asked, design_file, tmp_path):
+    """Only the last one was."""
+    parts = ("--parts", "linear=2,angular=2", "--out", tmp_path / "out")
+    both = ("--without", "opening", "--without", "stress")
+    assert status_of("optimize", design_file.parent, *parts, *both, "-q") == 0
+    required = asked["settings"].stages.requirements
+    assert (required.opening, required.stress, required.loads) == (False, False, True)
+
+
 def test_a_study_file_and_options_that_come_before_it(asked, design_file, tmp_path, capsys):
     study = tmp_path / "study.toml"
     study.write_text(

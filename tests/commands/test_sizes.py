@@ -1,5 +1,7 @@
 """Kits of several sizes: `kop tradeoff`, and `kop optimize --max-deviation`."""
 
+import argparse
+
 import pytest
 from support.commands import status_of
 
@@ -12,6 +14,9 @@ from kop_exudyn.report import sizes_run
 def test_ranges():
     assert part_ranges("linear=2:6:2,angular=5") == {"linear": [2, 4, 6], "angular": [5]}
     assert kit_cost("part=1,piece=0.5") == {"part": 1.0, "piece": 0.5}
+    assert kit_cost("piece=1") == {"part": 0.0, "piece": 1.0}  # parts cost 1 each besides, once
+    with pytest.raises(argparse.ArgumentTypeError, match="above 0"):
+        kit_cost("part=0")
 
 
 @pytest.mark.parametrize(
@@ -25,6 +30,11 @@ def test_ranges():
         (("optimize", "--max-deviation", "1", "--cost", "colour=1"), "expected part=W"),
         (("optimize", "--parts", "linear=2,angular=2", "--cost", "part=1"), "give it with"),
         (("optimize", "--max-deviation", "1", "--kit", "KIT"), "without --kit and --stock"),
+        (("optimize", "--kit", "KIT", "--published"), "--published: finds a kit of as many"),
+        (
+            ("optimize", "--max-deviation", "1", "--published"),
+            "--published: finds a kit of as many",
+        ),
     ],
 )
 def test_what_makes_no_sense(command, message, design_file, tmp_path, capsys):
