@@ -21,7 +21,6 @@ from .commands import NAMES
 from .commands.colour import RED, LogFormatter, coloured
 from .commands.help_text import HelpFormatter
 from .errors import InputError, OccupiedError, SimulationFailure, did_you_mean
-from .files.files import reason_of
 from .provenance import __version__
 
 # Imports make many objects that stay. To look through them for garbage after every 700 new ones, as
@@ -167,6 +166,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except OSError as error:
         if error.filename is not None:  # files' errors name them
             raise
+        from .files.files import reason_of
+
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return _complain(f"standard output can't be written: {reason_of(error)}", BAD_INPUT)
 

@@ -1,5 +1,6 @@
 """What the command line accepts, and what it says of what it doesn't."""
 
+import os
 import re
 import subprocess
 import sys
@@ -159,3 +160,14 @@ def test_files_that_options_name_are_looked_for_first(command, tmp_path, monkeyp
     told = capsys.readouterr().err
     assert told == "kop: vualt.obj: no such file (did you mean 'vault.obj'?)\n"
     assert not Path("out").exists()
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device that is always full")
+@pytest.mark.parametrize("redirected, status", [("> /dev/full", 2), (">&-", 0)])
+def test_output_that_can_not_be_written(repository, redirected, status):
+    """One line; they were tracebacks, with the status of a failed simulation."""
+    model = repository / "models" / "small" / "01_sinh.json"
+    command = f"'{sys.executable}' -m kop_exudyn simulate '{model}' {redirected}"
+    done = subprocess.run(command, shell=True, stderr=subprocess.PIPE, text=True, cwd=repository)
+    assert done.returncode == status and "Traceback" not in done.stderr
+    assert ("standard output can't be written: no space" in done.stderr) == (status == 2)
