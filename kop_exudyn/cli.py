@@ -160,15 +160,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _complain(f"simulation failed: {failure}", FAILED)
     except KeyboardInterrupt:
         return _complain("interrupted", INTERRUPTED)
-    except BrokenPipeError:  # the reader of our output has had enough, as in `kop ... | head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return OK
     except OSError as error:
         if error.filename is not None:  # files' errors name them
             raise
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if isinstance(error, BrokenPipeError):  # the reader has had enough, as in `kop ... | head`
+            return OK
         from .files.files import reason_of
 
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return _complain(f"standard output can't be written: {reason_of(error)}", BAD_INPUT)
 
 

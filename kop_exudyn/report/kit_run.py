@@ -19,16 +19,11 @@ from ..io.run_folder import RunFolder
 from ..kit.parts import Kit
 from ..kit.stock import Stock
 from ..search.events import StageEvent
+from ..search.job import described_job, design_digest
 from ..search.pool import DesignPool
+from ..search.request import check_request, check_types, kinds_of
 from ..search.result import KitResult
-from ..search.run import (
-    check_request,
-    check_types,
-    described_job,
-    design_digest,
-    kinds_of,
-    optimize_kit,
-)
+from ..search.run import optimize_kit
 from ..search.settings import JobSettings
 from ..structures.base import Design
 from ..structures.serving import served_by

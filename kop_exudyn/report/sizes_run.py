@@ -18,9 +18,10 @@ from ..files.json_files import plain, write_json
 from ..files.tables import write_csv
 from ..io.checkpoint import Job
 from ..io.run_folder import RunFolder
+from ..search.job import described_job, design_digest
 from ..search.pool import DesignPool
+from ..search.request import check_request
 from ..search.result import KitResult
-from ..search.run import check_request, described_job, design_digest
 from ..search.settings import JobSettings
 from ..structures.base import Design
 from ..structures.serving import served_by

@@ -384,7 +384,8 @@ def design_from_dict(data: Mapping[str, Any], source: str = _NO_FILE) -> Design:
         raise InputError("expected a design file's content", source=source, value=data)
     data = plain(data, finite=False)
     check_range(data, source)
-    check_schema({**_ENVELOPE, **data}, "design", source)
+    whole = {**_ENVELOPE, **data}
+    check_schema(whole, "design", source)
     class_name = data["class"]
     reader = CLASSES.get(class_name)
     if reader is None:
@@ -396,7 +397,7 @@ def design_from_dict(data: Mapping[str, Any], source: str = _NO_FILE) -> Design:
             value=class_name,
         )
     if has_schema(class_name):
-        check_schema({**_ENVELOPE, **data}, class_name, source)
+        check_schema(whole, class_name, source)
     try:
         near, middle = centred(data)
     except InputError as error:

@@ -14,9 +14,9 @@ from kop_exudyn.io.datasets import select_files
 from kop_exudyn.io.designs import load_design
 from kop_exudyn.io.saved_runs import load_run
 from kop_exudyn.report.kit_run import optimize_and_report, within_workshop
+from kop_exudyn.search.job import described_job
 from kop_exudyn.search.requirements import Requirements
 from kop_exudyn.search.result import KitResult
-from kop_exudyn.search.run import described_job
 from kop_exudyn.search.settings import JobSettings, StageSettings
 
 from .study import Study

@@ -15,11 +15,12 @@ from kop_exudyn.kit.kinds import part_kind
 from kop_exudyn.kit.part_costs import PartCosts
 from kop_exudyn.kit.parts import Kit
 from kop_exudyn.search.dataset import Dataset
+from kop_exudyn.search.job import described_job
 from kop_exudyn.search.pool import DesignPool
 from kop_exudyn.search.problems import AssignedProblem
 from kop_exudyn.search.reassign import LocalModel, best_parts, improved, keep_parts
 from kop_exudyn.search.requirements import Requirements
-from kop_exudyn.search.run import described_job, optimize_kit
+from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
 from kop_exudyn.search.sliding import best_in_boxes
 from kop_exudyn.search.stages import Stages

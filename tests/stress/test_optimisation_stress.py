@@ -15,8 +15,7 @@ from support.settings import FEW_ERRORS, QUICK
 
 from kop_exudyn.errors import InputError, SimulationFailure
 from kop_exudyn.kit.parts import Kit
-from kop_exudyn.search import pool
-from kop_exudyn.search import run as search_run
+from kop_exudyn.search import pool, request
 from kop_exudyn.search.evaluation import Evaluation
 from kop_exudyn.search.run import optimize_kit
 from kop_exudyn.search.settings import JobSettings, StageSettings
@@ -150,7 +149,7 @@ def test_kits_that_the_designs_are_not_made_for(part, built, caplog, monkeypatch
     """Stretched, wound up, or impossible: each design has a state or says why not. Stretched a
     hundredfold (None), what the solver finds is kept only where Exudyn confirms it. (Of most of
     these nothing is solved in use: all parts are in another unit.)"""
-    monkeypatch.setattr(search_run, "_FAR_OFF", np.inf)
+    monkeypatch.setattr(request, "_FAR_OFF", np.inf)
     designs = arches()
     outcome = run(designs, 1, kit=Kit({"linear": [[part, part]]}))
     check(outcome, designs, given=True)
